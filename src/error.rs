@@ -14,7 +14,12 @@ pub(crate) fn is_control(c: char) -> bool {
     c.is_control() || turns || matches!(c, '\u{2028}' | '\u{2029}' | '\u{2066}'..='\u{2069}')
 }
 
-/// A path as messages show it: what a terminal would obey and what is no text is escaped.
+/// The paths that mean standard input and output.
+pub(crate) const STANDARD_INPUT: &str = "/dev/stdin";
+pub(crate) const STANDARD_OUTPUT: &str = "/dev/stdout";
+
+/// A path as messages show it: what a terminal would obey and what is no text is escaped, and what
+/// is no file but a stream of the process is called so.
 pub(crate) fn shown(path: &Path) -> impl fmt::Display + '_ {
     struct Shown<'a>(&'a [u8]);
     impl fmt::Display for Shown<'_> {
@@ -32,7 +37,11 @@ pub(crate) fn shown(path: &Path) -> impl fmt::Display + '_ {
         }
     }
     use std::os::unix::ffi::OsStrExt;
-    Shown(path.as_os_str().as_bytes())
+    Shown(match path.to_str() {
+        Some(STANDARD_INPUT) => b"standard input",
+        Some(STANDARD_OUTPUT) => b"standard output",
+        _ => path.as_os_str().as_bytes(),
+    })
 }
 
 /// What helps where `path` does not exist: what it is relative to.

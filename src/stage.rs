@@ -11,6 +11,7 @@ mod rounds;
 mod scan;
 mod sink;
 mod source;
+mod split;
 mod tile_op;
 mod unread;
 mod walk;
@@ -44,6 +45,7 @@ pub use sink::{
 };
 pub(crate) use source::BATCH;
 pub use source::{Contradiction, Input, OpenSource, Part, Source};
+pub use split::{OutputSplit, SplitKey};
 pub use tile_op::{Forecast, ScanFacts, TileOp};
 pub use unread::Unread;
 pub use walk::PointWalk;

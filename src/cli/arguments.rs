@@ -139,11 +139,12 @@ pub(super) struct PredictArguments {
 
 #[derive(Debug, Args)]
 pub(super) struct ConvertArguments {
-    /// Files of points, patterns or folders, or @LIST: a text with one of them a line
+    /// Files of points, patterns or folders, or @LIST: a text with one of them a line; or - for
+    /// standard input
     #[arg(value_name = "IN", required = true)]
     pub inputs: Vec<String>,
     /// A file, which takes all inputs, or a folder (that exists, or with a slash behind), which
-    /// takes one output an input
+    /// takes one output an input; or - for standard output, with --to
     #[arg(short, long, value_name = "OUT|DIR")]
     pub output: String,
     /// Format, such as laz, ply or csv [default: by extension; in a folder, the input's]

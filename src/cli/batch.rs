@@ -75,7 +75,7 @@ pub(super) fn run_all(runs: Vec<BatchRun>, jobs: usize, console: &Console) -> Ba
     let began = std::time::Instant::now();
     let (jobs, is_alone) = (jobs.clamp(1, runs.len().max(1)), runs.len() == 1);
     if jobs > 1 {
-        console.tell_several();
+        console.tell_several(runs.len());
     }
     let next = AtomicUsize::new(0);
     let (mut places, mut works) = (Vec::new(), Vec::new());
@@ -93,6 +93,7 @@ pub(super) fn run_all(runs: Vec<BatchRun>, jobs: usize, console: &Console) -> Ba
             let Ok(mut slot) = work.lock() else { return };
             let Some(work) = slot.0.take() else { return };
             slot.1 = one(work, &place.0, (jobs, is_alone), console);
+            console.one_done();
         }
     };
     std::thread::scope(|scope| {
@@ -102,6 +103,7 @@ pub(super) fn run_all(runs: Vec<BatchRun>, jobs: usize, console: &Console) -> Ba
         work();
         drop(helpers);
     });
+    console.all_done();
     let outcome = |slot: Mutex<(_, BatchOutcome)>| match slot.into_inner() {
         Ok((_, outcome)) => outcome,
         Err(_) => BatchOutcome::NotBegun,

@@ -12,7 +12,7 @@ use serde_json::Value;
 use super::arguments::{Command, Progress};
 use super::draw::{Draw, Nothing, of_input, watched};
 use super::events::{Events, RunEvents, error_keys};
-use super::progress::Bars;
+use super::progress::{Bars, FileBar, ManyBars};
 use super::words::{Told, Words};
 use super::{interrupt, print};
 use crate::engine::{Done, Watch};
@@ -34,6 +34,8 @@ pub(super) struct Console {
     hint: OnceLock<&'static str>,
     /// True while several runs work at once: of each only warnings and errors are told.
     several: AtomicBool,
+    /// Their bars, where there are any.
+    bars: OnceLock<ManyBars>,
 }
 
 enum Voice {
@@ -60,12 +62,36 @@ impl Console {
             interrupted: OnceLock::new(),
             hint: OnceLock::new(),
             several: AtomicBool::new(false),
+            bars: OnceLock::new(),
         }
     }
 
-    /// From now on several runs work at once: no bars, no phases.
-    pub fn tell_several(&self) {
+    /// From now on several runs work at once, `files` in all: a bar each, and no phases.
+    pub fn tell_several(&self, files: usize) {
         self.several.store(true, Ordering::Relaxed);
+        if let (false, Voice::Text(true)) = (self.quiet, &self.voice)
+            && let Some(bars) = ManyBars::new(files)
+        {
+            self.bars.get_or_init(|| bars);
+        }
+    }
+
+    /// One of several runs is over.
+    pub fn one_done(&self) {
+        self.bars.get().into_iter().for_each(ManyBars::done);
+    }
+
+    /// All of them are.
+    pub fn all_done(&self) {
+        self.bars.get().into_iter().for_each(ManyBars::end);
+    }
+
+    /// Calls `print` while no bar of several runs is in its way.
+    fn beside(&self, print: impl FnOnce()) {
+        match self.bars.get() {
+            Some(bars) => bars.beside(print),
+            None => print(),
+        }
     }
 
     /// An error as JSON, in the words of the command.
@@ -151,7 +177,9 @@ impl Console {
         match &self.voice {
             _ if self.quiet => watched(&mut Nothing, &cancelled, run),
             _ if self.several.load(Ordering::Relaxed) => {
-                watched(&mut WarningsAlone { console: self, input }, &cancelled, run)
+                let name = input.as_deref().unwrap_or_default();
+                let bar = self.bars.get().map(|bars| bars.one(name));
+                watched(&mut OneOfMany { console: self, input, bar }, &cancelled, run)
             }
             Voice::Json(events) => {
                 watched(&mut RunEvents::new(events, &self.words, input), &cancelled, run)
@@ -186,7 +214,7 @@ impl Console {
         match &self.voice {
             _ if self.quiet => {}
             Voice::Json(events) => events.warn(message),
-            Voice::Text(_) => print::warning(message),
+            Voice::Text(_) => self.beside(|| print::warning(message)),
         }
     }
 
@@ -200,18 +228,35 @@ impl Console {
         let told = Told::of(error, &self.words);
         match &self.voice {
             Voice::Json(events) => events.error(&told),
-            Voice::Text(_) => print::error(&told),
+            Voice::Text(_) => self.beside(|| print::error(&told)),
         }
     }
 }
 
-/// Tells what a run warns of, and nothing else.
-struct WarningsAlone<'a> {
+/// Tells what one of several runs warns of, and how far it is, and nothing else.
+struct OneOfMany<'a> {
     console: &'a Console,
     input: Option<String>,
+    bar: Option<FileBar>,
 }
 
-impl Draw for WarningsAlone<'_> {
+impl Draw for OneOfMany<'_> {
+    fn every(&self) -> Duration {
+        if self.bar.is_some() { Bars::EVERY } else { Duration::from_secs(1) }
+    }
+
+    fn begin(&mut self, name: &'static str, total: Option<u64>) {
+        self.bar.iter_mut().for_each(|bar| bar.begin(name, total));
+    }
+
+    fn advance(&mut self, done: u64) {
+        self.bar.iter().for_each(|bar| bar.advance(done));
+    }
+
+    fn end(&mut self, _done: u64) {
+        self.bar.iter_mut().for_each(FileBar::end);
+    }
+
     fn warn(&mut self, message: &str) {
         self.console.warn(&of_input(self.input.as_deref(), message));
     }

@@ -18,7 +18,7 @@ use crate::engine::{make_folder, refuse_existing};
 use crate::error::{listed, shown};
 use crate::graph::Existing;
 use crate::graph::Graph;
-use crate::host::{Clash, Files, Use};
+use crate::host::{Clash, Files, Use, standard};
 use crate::io::ends::{MirroredFile, expand_mirrored, unreadable};
 use crate::language::Registry;
 use crate::stage::Formats;
@@ -199,6 +199,10 @@ fn outputs(
     let mut taken: BTreeMap<PathBuf, &Path> = BTreeMap::new();
     let mut all = Vec::new();
     for MirroredFile { file: input, way } in inputs {
+        if standard::is_input(input) {
+            let told = "standard input has no name that its output in a folder could have";
+            return Err(Error::pipeline(told).help("name the file: `-o FILE`"));
+        }
         let own = || formats.of(input).map(|format| format.extension());
         let asked = |to| formats.iter().find(|f| f.name() == to).map_or(to, |f| f.extension());
         let (Some(stem), Some(extension)) = (formats.stem(input), to.map(asked).or_else(own))

@@ -1,5 +1,7 @@
 //! `run`, `reduce` and `synth`: arguments to a pipeline, and the pipeline's run.
 
+use std::path::Path;
+
 use super::arguments::{CutArguments, PlanArguments, ReduceArguments, SynthArguments};
 use super::console::Console;
 use super::flags::{common_flags, cut_flags, given, synth_flags};
@@ -13,6 +15,7 @@ use crate::Result;
 use crate::engine::Done;
 use crate::graph::Graph;
 use crate::graph::Overrides;
+use crate::host::standard;
 use crate::language::Registry;
 
 /// Behind what `reduce` chose by itself.
@@ -105,8 +108,13 @@ fn mill_towards(read: &dyn Fn() -> Result<Graph>, console: &Console) -> Result<D
     console.run(plan)
 }
 
-/// Prints the closing table of a run; fails if its result is not accepted.
+/// Prints the closing table of a run, beside points that went to standard output on stderr; fails
+/// if its result is not accepted.
 pub(super) fn finish(done: &Done, console: &Console) -> Result<()> {
-    console.result(done)?;
+    let mut outputs = done.report.run.outputs.iter();
+    match outputs.any(|output| standard::is_output(Path::new(&output.path))) {
+        true => console.note(done),
+        false => console.result(done)?,
+    }
     done.accepted()
 }

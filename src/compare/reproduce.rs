@@ -16,7 +16,7 @@ use crate::engine::scratch::{Scratch, Trouble};
 use crate::error::shown;
 use crate::graph::{Graph, Overrides, RunSettings};
 use crate::host::hashed::FileHash;
-use crate::host::lock;
+use crate::host::{lock, standard};
 use crate::io::note;
 use crate::language::{PipelineText, Registry};
 use crate::report::Grouped;
@@ -219,6 +219,9 @@ fn find<'a>(
 
 /// Where an input may be, the likeliest first.
 fn candidates(told: &str, output: &Path, folder: Option<&Path>) -> Vec<PathBuf> {
+    if told == standard::DASH {
+        return unnamed(folder);
+    }
     let told = Path::new(told);
     let down: PathBuf =
         told.components().filter(|part| matches!(part, Component::Normal(_))).collect();
@@ -233,17 +236,27 @@ fn candidates(told: &str, output: &Path, folder: Option<&Path>) -> Vec<PathBuf> 
     all.into_iter().filter(|path| path.is_file()).collect()
 }
 
+/// Where an input may be that came by standard input: there, or under any name in the folder.
+fn unnamed(folder: Option<&Path>) -> Vec<PathBuf> {
+    let Some(folder) = folder else { return vec![standard::input(standard::DASH)] };
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut all: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+    all.retain(|path| path.is_file());
+    all.sort();
+    all
+}
+
 /// The first of `candidates` that is the input, or what is wrong with them.
 fn found_one(input: &ToldInput, candidates: &[PathBuf], watch: &dyn Watch) -> Result<PathBuf> {
     let go_on = || if watch.cancelled() { Err(Error::interrupted()) } else { Ok(()) };
     let mut wrong = None;
     for path in candidates {
-        let bytes = fs::metadata(path).map_err(|e| Error::io(path, "find it", e))?.len();
+        let bytes = standard::about(path)?.len();
         let told = if bytes != input.bytes {
             let (was, is) = (Grouped(input.bytes), Grouped(bytes));
             format!("the input had {was} bytes, and this file has {is}")
         } else {
-            let hash = FileHash::of(path, go_on)?;
+            let hash = FileHash::of(&standard::opened(path)?, go_on)?;
             if hash.sha256.eq_ignore_ascii_case(&input.sha256) {
                 return Ok(path.clone());
             }

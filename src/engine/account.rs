@@ -6,7 +6,6 @@
 //! so a record that is lost or written twice fails the run instead of being hidden in a difference.
 
 use std::borrow::Cow;
-use std::fs;
 use std::path::Path;
 
 use super::clock::Clock;
@@ -19,11 +18,12 @@ use super::survey::Measured;
 use super::tagger::{LEFT_OUT, NOT_FINITE};
 use super::task::Task;
 use crate::host::process::peak_memory;
+use crate::host::standard;
 use crate::report::{
     AcceptVerdict, Decision, FileFigures, Grouped, LatticeFigures, Ledger, Machine, Outcome,
     Removed, Report, RunFigures, check_written,
 };
-use crate::stage::{Input, SinkSummary, Source};
+use crate::stage::{Input, OutputSplit, SinkSummary, Source};
 use crate::{Error, Result};
 
 impl Task {
@@ -34,8 +34,8 @@ impl Task {
         finished: &'a Finished,
     ) -> impl Iterator<Item = (&'a Path, bool, &'a (u64, SinkSummary))> {
         let files = |sink: usize| -> Vec<(&'a Path, bool)> {
-            match self.has_squares(sink) {
-                true => finished.squares[sink].iter().map(|path| (&**path, true)).collect(),
+            match self.is_split(sink) {
+                true => finished.split[sink].iter().map(|path| (&**path, true)).collect(),
                 false => self.files(sink).iter().map(|to| (to.path(), to.is_file())).collect(),
             }
         };
@@ -118,7 +118,10 @@ impl Task {
         }
         let is_on = |sink: &usize| std::ptr::eq(&self.branches[self.branch_of[*sink]], branch);
         let on_branch = || (0..self.sinks.len()).filter(is_on);
-        let sides = on_branch().filter_map(|sink| self.sides[sink]);
+        let sides = on_branch().filter_map(|sink| match self.splits[sink] {
+            Some(OutputSplit::Squares(side)) => Some(side),
+            _ => None,
+        });
         let radii = on_branch().filter_map(|sink| self.meshes[sink]?.max_radius);
         let lengths = sides.map(|side| ("write", "side", side));
         let lengths = lengths.chain(radii.map(|radius| ("mesh", "max_radius", radius)));
@@ -183,7 +186,7 @@ fn named((name, count): (&Cow<'static, str>, &u64)) -> (String, u64) {
 
 fn input_figures(source: &dyn Source, hashes: Option<&InputHashes>) -> Vec<FileFigures> {
     let figures = |input: Input| {
-        let bytes = fs::metadata(&input.path).ok().map(|about| about.len());
+        let bytes = standard::about(&input.path).ok().map(|about| about.len());
         let sha256 = hashes.and_then(|hashes| hashes.of(&input.path));
         FileFigures { sha256, ..FileFigures::of(&input.path, input.points, bytes) }
     };

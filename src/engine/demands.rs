@@ -5,7 +5,7 @@
 //! which a run leases them and a refusal lists them.
 
 use super::by_rank::ordering_bytes;
-use super::by_square::writing_bytes;
+use super::by_split::writing_bytes;
 use super::chunk::OutputChunk;
 use super::encoding::ChunkEncoder;
 use super::filtering::Filtering;
@@ -172,10 +172,10 @@ impl Demands {
         ])
     }
 
-    /// What is held while the files of squares are written.
-    pub fn squares(&self) -> Holders {
+    /// What is held while the files of a split are written.
+    pub fn splitting(&self) -> Holders {
         let writing = writing_bytes(self.chunk, self.stride + self.columns.row);
-        Holders::of([("writing of squares", self.by_threads(writing))])
+        Holders::of([("writing of split files", self.by_threads(writing))])
     }
 
     /// Bytes of a tile per position it holds, the product that it leaves behind included.

@@ -15,8 +15,8 @@ pub(crate) struct Finished {
     pub read: u64,
     /// For each file of each sink, the records that it was given, and what it says.
     pub written: Vec<Vec<(u64, SinkSummary)>>,
-    /// For each sink the paths of these files, if it is one of squares.
-    pub squares: Vec<Vec<PathBuf>>,
+    /// For each sink the paths of these files, if it is split.
+    pub split: Vec<Vec<PathBuf>>,
     /// Counts of all branches together.
     pub tally: Tally,
     /// What each branch came to.

@@ -155,7 +155,7 @@ impl<'a> Job<'a> {
 
     /// What the output of a sink that is to be at `path` says of the run.
     pub fn note(&self, sink: usize, path: &Path) -> Option<Arc<RunNote>> {
-        let is_several = self.task.sinks[sink].is_folder() || self.task.has_squares(sink);
+        let is_several = self.task.sinks[sink].is_folder() || self.task.is_split(sink);
         let note = self.task.provenance.note(self.hashes.as_ref(), (sink, is_several), path);
         note.unwrap_or_else(|told| {
             self.warn(told);

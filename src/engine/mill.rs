@@ -78,7 +78,7 @@ pub(crate) fn mill(
     Ok(Finished {
         read: tally.work.remove("read").unwrap_or(0),
         written: written.collect::<Result<_>>()?,
-        squares: Vec::new(),
+        split: Vec::new(),
         tally,
         branches,
     })

@@ -9,7 +9,7 @@ mod account;
 pub(crate) mod beside;
 pub(crate) mod by_input;
 pub(crate) mod by_rank;
-pub(crate) mod by_square;
+pub(crate) mod by_split;
 mod by_time;
 mod chunk;
 mod chunks;

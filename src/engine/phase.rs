@@ -24,7 +24,7 @@ pub(crate) enum RunPhase {
     /// Tiles in this pass.
     Mill(usize),
     /// Files of this sink, or stretches of it, which are written behind the tiles of a pass, or
-    /// behind all points where they are squares.
+    /// behind all points where the output is split.
     Write(usize),
     /// Squares of the plane, in which the points of this sink are connected.
     Connect(usize),
@@ -71,8 +71,8 @@ pub(crate) const LOOK: &str = "look";
 impl Task {
     /// All phases of the run, in their order.
     pub fn phases(&self) -> Vec<RunPhase> {
-        let squares = (0..self.sinks.len()).filter(|sink| self.has_squares(*sink));
-        let end = squares.map(RunPhase::Write).chain([RunPhase::Publish]);
+        let split = (0..self.sinks.len()).filter(|sink| self.is_split(*sink));
+        let end = split.map(RunPhase::Write).chain([RunPhase::Publish]);
         if !self.mills {
             return [RunPhase::Convert].into_iter().chain(end).collect();
         }

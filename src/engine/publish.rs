@@ -15,6 +15,7 @@ use std::sync::Arc;
 use super::scratch::{Scratch, Trouble};
 use crate::error::{shown, whereabouts};
 use crate::graph::Existing;
+use crate::host::standard;
 use crate::{Error, ErrorKind, Result};
 
 /// A file that is to appear at `path`.
@@ -31,7 +32,7 @@ impl Staged {
     /// run before its work and not behind it. `trouble` is for scratch that stays.
     pub fn beside(path: &Path, existing: Existing, trouble: &Trouble) -> Result<Self> {
         check_place(path, existing)?;
-        let scratch = Arc::new(Scratch::below(&folder_of(path), trouble));
+        let scratch = Arc::new(Scratch::below(&growing_in(path), trouble));
         let file = scratch.path("output").map_err(|error| match error.path() {
             // The folder itself refuses; other failures have their own remedies.
             Some(refusing) if refusing == scratch.parent() => error.help(
@@ -44,7 +45,7 @@ impl Staged {
 
     /// The same for another file of the run, in this one's scratch folder where both are beside it.
     pub fn also(&self, path: &Path, trouble: &Trouble) -> Result<Self> {
-        match folder_of(path) == folder_of(&self.path) {
+        match growing_in(path) == growing_in(&self.path) {
             true => self.in_same_folder(path),
             false => Staged::beside(path, self.existing, trouble),
         }
@@ -78,8 +79,11 @@ impl Staged {
         error.readdress(&self.file, &self.path)
     }
 
-    /// Gives the file its name.
+    /// Gives the file its name; what is for standard output is copied there.
     fn place(&self) -> Result<()> {
+        if standard::is_output(&self.path) {
+            return standard::send(&self.file);
+        }
         let failed = |e| Error::io(&self.path, "put the finished file in place", e);
         match self.existing {
             Existing::Replace => {
@@ -106,7 +110,8 @@ impl Staged {
 }
 
 /// Gives the outputs their names, one after the other, and then the report; all of them are
-/// on disk already. The names of the outputs are on disk before the report appears.
+/// on disk already. The names of the outputs are on disk before the report appears. What is for
+/// standard output comes first: nothing else is in place if its reader refuses it.
 ///
 /// # Errors
 ///
@@ -115,7 +120,9 @@ pub fn publish(outputs: &[Staged], report: Option<&Staged>) -> Result<()> {
     let mut placed: Vec<&Path> = Vec::new();
     let all = outputs.len() + usize::from(report.is_some());
     let mut place = |files: &mut dyn Iterator<Item = _>| place_all(files, &mut placed);
-    let outcome = place(&mut outputs.iter()).and_then(|()| place(&mut report.into_iter()));
+    let is_sent = |staged: &&Staged| standard::is_output(&staged.path);
+    let mut in_order = outputs.iter().filter(is_sent).chain(outputs.iter().filter(|s| !is_sent(s)));
+    let outcome = place(&mut in_order).and_then(|()| place(&mut report.into_iter()));
     outcome.map_err(|error| match (placed.len(), error.remedy().map(str::to_owned)) {
         (0, _) => error,
         (_, remedy) => {
@@ -133,7 +140,7 @@ fn place_all<'a>(
     for staged in files {
         staged.place()?;
         placed.push(&staged.path);
-        let folder = folder_of(&staged.path);
+        let folder = growing_in(&staged.path);
         if !folders.contains(&folder) {
             folders.push(folder);
         }
@@ -236,6 +243,9 @@ fn existing(path: &Path) -> Error {
 /// Refuses `path` if no file can appear there: its folder is missing, or something is there that
 /// would be replaced and is no file, or is to stay.
 pub fn check_place(path: &Path, existing: Existing) -> Result<()> {
+    if standard::is_output(path) {
+        return standard::check_output();
+    }
     match fs::metadata(path) {
         Ok(there) if there.is_dir() => {
             return Err(Error::pipeline("this is a folder, not a file to write")
@@ -273,10 +283,17 @@ pub fn check_place(path: &Path, existing: Existing) -> Result<()> {
     Err(Error::new(ErrorKind::Io, "the folder does not exist").at(folder).help(help))
 }
 
-/// The folder that a file is in.
+/// The folder in which a file grows: its own, so that a rename puts it in place.
+fn growing_in(path: &Path) -> PathBuf {
+    if standard::is_output(path) { std::env::temp_dir() } else { folder_of(path) }
+}
+
+/// The folder that a file is in; standard output is taken to end up where the process is.
 pub fn folder_of(path: &Path) -> PathBuf {
     match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
+        Some(parent) if !parent.as_os_str().is_empty() && !standard::is_output(path) => {
+            parent.to_owned()
+        }
         _ => PathBuf::from("."),
     }
 }

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use super::Watch;
 use super::account::nothing_left;
 use super::by_rank::listed_bytes;
-use super::by_square::{BySquare, SquareFile, SquareSink};
+use super::by_split::{BySplit, SplitFile, SplitSink};
 use super::clock::Clock;
 use super::finished::Finished;
 use super::job::Job;
@@ -112,7 +112,7 @@ impl Task {
             (None, None) => Arc::new(Scratch::below(&std::env::temp_dir(), trouble)),
             (Some(folder), _) => Arc::new(Scratch::below(folder, trouble)),
         };
-        let (finished, mut run, squares) =
+        let (finished, mut run, split) =
             self.work(ops, &outputs, &scratch, threads, watch, &mut clock).map_err(tell)?;
         drop(scratch);
         let copies = first.map(|first| self.beside.iter().map(|copy| copy.make(first, trouble)));
@@ -124,21 +124,21 @@ impl Task {
         clock.begin(RunPhase::Publish, None)?;
         self.check_size(&run.outputs)?;
         if staged_report.is_some() && matches!(self.provenance, Provenance::Told { .. }) {
-            let written = outputs.iter().flatten().chain(&squares).chain(&beside);
+            let written = outputs.iter().flatten().chain(&split).chain(&beside);
             hash_outputs(&mut run, written.collect(), watch)?;
         }
         let (report, tiles) = self.account(finished, run, clock)?;
         if let (Some(path), Some(staged)) = (report_path, &staged_report) {
             let sink = self.first_sink();
-            let written = if self.has_squares(sink) { &squares[..] } else { &outputs[sink][..] };
+            let written = if self.is_split(sink) { &split[..] } else { &outputs[sink][..] };
             let places = (path, staged.file());
             let told = self.write_report(places, &report, &tiles, written);
             told.map_err(|error| staged.tell(error))?;
         }
         drop(tiles);
         // What an output refers to comes first, so that none refers to what is not there.
-        let places = (0..).zip(outputs).filter(|(sink, _)| !self.has_squares(*sink));
-        let files = places.flat_map(|(_, staged)| staged).chain(squares);
+        let places = (0..).zip(outputs).filter(|(sink, _)| !self.is_split(*sink));
+        let files = places.flat_map(|(_, staged)| staged).chain(split);
         let outputs: Vec<Staged> = beside.into_iter().chain(files).collect();
         publish(&outputs, staged_report.as_ref())?;
         let unit = self.source.metadata().units.sign();
@@ -164,7 +164,7 @@ impl Task {
         for (n, sink) in self.sinks.iter().enumerate() {
             if sink.is_folder() {
                 make_folder(sink.path())?;
-            } else if sink.has_squares() {
+            } else if sink.is_split() {
                 make_folder(&folder_of(sink.path()))?;
             }
             let mut staged: Vec<Staged> = Vec::new();
@@ -186,20 +186,20 @@ impl Task {
     }
 
     /// Opens the sinks but those of the inputs, which are created one by one, when their records
-    /// are known. Those of squares set their records down.
+    /// are known. Those that are split set their records down.
     fn create_sinks(
         &self,
         job: &Job<'_>,
-        squares: &[Option<Arc<BySquare>>],
+        splits: &[Option<Arc<BySplit>>],
     ) -> Result<Vec<Option<Box<dyn Sink>>>> {
         let (schema, outputs) = (self.schema(), job.outputs);
         let whole = !self.mills && self.transforms.is_empty() && !self.drops_nonfinite();
         let mut sinks: Vec<Option<Box<dyn Sink>>> = Vec::new();
         for (n, (sink, staged)) in self.sinks.iter().zip(outputs).enumerate() {
             let metadata = self.metadata(n, (!whole).then(|| self.pipeline(n)));
-            if let Some(squares) = &squares[n] {
+            if let Some(split) = &splits[n] {
                 let chunk = sink.chunk(schema, &metadata)?;
-                sinks.push(Some(Box::new(SquareSink::new(squares.clone(), chunk))));
+                sinks.push(Some(Box::new(SplitSink::new(split.clone(), chunk))));
                 continue;
             }
             let note = if sink.is_folder() { None } else { job.note(n, sink.path()) };
@@ -225,8 +225,9 @@ impl Task {
         clock: &mut Clock<'_>,
     ) -> Result<(Finished, RunFigures, Vec<Staged>)> {
         let mut job = Job::new(self, ops, outputs, scratch, threads, watch)?;
-        let squares: Vec<_> = (0..self.sinks.len()).map(|n| self.by_square(&job, n)).collect();
-        let sinks = self.create_sinks(&job, &squares)?;
+        let splits = (0..self.sinks.len()).map(|n| self.by_split(&job, n));
+        let splits: Vec<_> = splits.collect::<Result<_>>()?;
+        let sinks = self.create_sinks(&job, &splits)?;
         let folder = scratch.parent();
         let doubts = self.check_room(&job, folder)?;
         self.warnings.iter().cloned().chain(doubts).for_each(|warning| job.warn(warning));
@@ -239,7 +240,7 @@ impl Task {
                 stream(&job, sinks, lattice.as_ref())?
             }
         };
-        let files = self.write_squares(&job, &squares, &mut finished, clock)?;
+        let files = self.write_split(&job, &splits, &mut finished, clock)?;
         if let Some(hashes) = &job.hashes {
             hashes.all()?;
         }
@@ -251,35 +252,36 @@ impl Task {
         Ok((finished, run, files))
     }
 
-    /// The squares of a sink, if it is cut into such.
-    fn by_square(&self, job: &Job<'_>, sink: usize) -> Option<Arc<BySquare>> {
+    /// What sorts the records of a sink by file, if it is split.
+    fn by_split(&self, job: &Job<'_>, sink: usize) -> Result<Option<Arc<BySplit>>> {
         let layout = RowLayout::of(self.computed[sink].iter().map(|computed| computed.column));
-        let squares = |side| BySquare::new(&job.area, side, self.schema(), layout);
-        self.sides[sink].map(squares).map(Arc::new)
+        let split = self.splits[sink].as_ref();
+        let split = split.map(|split| BySplit::new(job, sink, split, layout));
+        Ok(split.transpose()?.map(Arc::new))
     }
 
-    /// Writes the files of all squares; where they grew.
-    fn write_squares(
+    /// Writes the files of all splits; where they grew.
+    fn write_split(
         &self,
         job: &Job<'_>,
-        squares: &[Option<Arc<BySquare>>],
+        splits: &[Option<Arc<BySplit>>],
         finished: &mut Finished,
         clock: &mut Clock<'_>,
     ) -> Result<Vec<Staged>> {
         let mut staged = Vec::new();
-        finished.squares.resize_with(squares.len(), Vec::new);
-        for (sink, squares) in squares.iter().enumerate() {
-            let Some(squares) = squares else { continue };
-            clock.begin(RunPhase::Write(sink), Some(squares.records()))?;
-            let _working = job.budget.lease_all(&self.demands.squares(), "squares")?;
-            let (given, set_down) = (&mut finished.written[sink], squares.records());
+        finished.split.resize_with(splits.len(), Vec::new);
+        for (sink, split) in splits.iter().enumerate() {
+            let Some(split) = split else { continue };
+            clock.begin(RunPhase::Write(sink), Some(split.records()))?;
+            let _working = job.budget.lease_all(&self.demands.splitting(), "split files")?;
+            let (given, set_down) = (&mut finished.written[sink], split.records());
             check_written(self.sinks[sink].path(), given.iter().map(|(n, _)| n).sum(), set_down)?;
             given.clear();
-            for SquareFile { path, staged: file, given: records, summary } in
-                squares.write(job, sink)?
+            for SplitFile { path, staged: file, given: records, summary } in
+                split.write(job, sink)?
             {
                 given.push((records, summary));
-                finished.squares[sink].push(path);
+                finished.split[sink].push(path);
                 staged.push(file);
             }
         }
@@ -294,9 +296,9 @@ impl Task {
             let bytes = self.spilled(&job.shares);
             all.push(Taken { folder, spilled: true, bytes, again: 0 });
         }
-        let of_squares = self.sides.iter().flatten().count() as u64;
-        if of_squares > 0 {
-            let each = (self.schema().stride as u64).saturating_mul(of_squares);
+        let split = self.splits.iter().flatten().count() as u64;
+        if split > 0 {
+            let each = (self.schema().stride as u64).saturating_mul(split);
             let bytes = self.source.points().saturating_mul(each);
             all.push(Taken { folder, spilled: true, bytes, again: 0 });
         }

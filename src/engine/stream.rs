@@ -49,7 +49,7 @@ pub(crate) fn stream(
     };
     Ok(Finished {
         read,
-        squares: Vec::new(),
+        split: Vec::new(),
         written: written.into_iter().map(|summary| vec![(kept, summary)]).collect(),
         tally,
         branches: vec![branch],

@@ -17,7 +17,7 @@ use crate::geom::simd::Simd;
 use crate::graph::{Nonfinite, RunSettings, RunTraits, SpillSetting};
 use crate::point::{ComputedDimension, Metadata, Schema, names};
 use crate::report::AcceptTable;
-use crate::stage::{CreateSink, Source, Triangulation};
+use crate::stage::{CreateSink, OutputSplit, Source, Triangulation};
 
 /// The schemas of records on their way through the stages that stream in the decode.
 pub(crate) struct Schemas {
@@ -60,8 +60,8 @@ pub(crate) struct Task {
     pub each: Vec<Vec<Box<dyn CreateSink>>>,
     /// For each tile stage, the lengths that were converted to the unit of the scan.
     pub given: Vec<GivenLengths>,
-    /// For each sink, the side of the squares that it is cut into.
-    pub sides: Vec<Option<f64>>,
+    /// For each sink, into which files it is split.
+    pub splits: Vec<Option<OutputSplit>>,
     /// For each sink, how its points are connected, if they are.
     pub meshes: Vec<Option<Triangulation>>,
     /// What is to be copied beside outputs.
@@ -116,9 +116,9 @@ impl Task {
         }
     }
 
-    /// True if a sink is cut into squares.
-    pub fn has_squares(&self, sink: usize) -> bool {
-        self.sides[sink].is_some()
+    /// True if a sink is split.
+    pub fn is_split(&self, sink: usize) -> bool {
+        self.splits[sink].is_some()
     }
 
     /// The stages on the branch of a sink, as outputs name them.

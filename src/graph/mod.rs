@@ -9,7 +9,6 @@ mod drawn;
 pub(crate) mod limits;
 pub(crate) mod noted;
 mod settings;
-mod size;
 mod toml;
 mod tree;
 mod written;
@@ -18,6 +17,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+pub use crate::quantity::parse_bytes;
 use crate::report::AcceptTable;
 use crate::stage::{Role, RoleName};
 use crate::{Error, Result};
@@ -29,7 +29,6 @@ pub use settings::{
     Existing, Headers, MixedUnits, Nonfinite, Overrides, RunSettings, SimdSetting, SpillSetting,
     Treatment, ZScale,
 };
-pub use size::parse_bytes;
 pub(crate) use toml::literal;
 pub use tree::GraphMistake;
 pub(crate) use tree::{TreeStage, mistakes as tree_mistakes};

@@ -108,7 +108,7 @@ impl NotedGraph {
         let number = self.outputs.len();
         let mut name = if number == 0 { OUTPUT.into() } else { format!("{OUTPUT}-{}", number + 1) };
         let path = sink.path();
-        if sink.has_squares() {
+        if sink.is_split() {
             name = format!("{name}/{}", path.file_name().and_then(OsStr::to_str)?);
         } else if let Some(extension) = sink.extension().filter(|_| !sink.is_folder()) {
             name = format!("{name}.{}", extension.to_str()?.to_ascii_lowercase());
@@ -122,7 +122,7 @@ impl NotedGraph {
     pub fn output(&self, number: usize, path: &Path, is_several: bool) -> Option<PathBuf> {
         let name = self.outputs.get(number)?.as_ref()?;
         Some(match (is_several, path.file_name()) {
-            // That of a folder is the folder, that of squares their pattern.
+            // That of a folder is the folder, that of a split its pattern.
             (true, Some(file)) if name.components().count() > 1 => name.with_file_name(file),
             (true, Some(file)) => name.join(file),
             _ => name.clone(),

@@ -6,10 +6,9 @@ use std::path::PathBuf;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
-use super::size::{SizeText, some_bytes};
 use crate::geom::simd;
 use crate::geom::simd::Level;
-use crate::quantity::{Whole, has_schema};
+use crate::quantity::{SizeText, Whole, has_schema, some_bytes};
 use crate::{Error, Result};
 
 /// What a run may use and where it leaves things. No setting but `lattice`, `z_scale`, `nonfinite`,

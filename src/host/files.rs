@@ -8,6 +8,7 @@ use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Component, Path, PathBuf};
 
+use super::standard;
 use crate::error::shown;
 
 /// All files of a command. What is read is entered first, then what is written.
@@ -90,6 +91,10 @@ impl Files {
 impl Identity {
     fn of(path: &Path) -> Identity {
         match fs::metadata(path) {
+            // Both may be one device, which nothing is written over.
+            _ if standard::is_input(path) || standard::is_output(path) => {
+                Identity::Place(path.to_owned())
+            }
             Ok(there) => Identity::There(there.dev(), there.ino()),
             Err(_) => Identity::Place(resolved(path)),
         }
@@ -97,8 +102,12 @@ impl Identity {
 }
 
 /// The way from `folder`, which is resolved, to the file at `path`: its folder is resolved, too,
-/// and its name stays as it is, link or not.
+/// and its name stays as it is, link or not. Standard input is
+/// everywhere the same.
 pub fn relative(folder: &Path, path: &Path) -> PathBuf {
+    if standard::is_input(path) {
+        return PathBuf::from(standard::DASH);
+    }
     let Some(name) = path.file_name() else { return resolved(path) };
     let above = resolved(path.parent().unwrap_or(Path::new("")));
     let common = above.components().zip(folder.components()).take_while(|(a, b)| a == b).count();

@@ -5,6 +5,7 @@ pub(crate) mod disk;
 pub(crate) mod files;
 pub(crate) mod hashed;
 pub mod process;
+pub(crate) mod standard;
 mod tallies;
 pub(crate) mod threads;
 

@@ -2,6 +2,7 @@
 //! the stages that name files. Knows nothing of tiles.
 
 pub(crate) mod convert;
+mod damage;
 mod deep;
 mod describe;
 pub mod e57;

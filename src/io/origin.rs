@@ -6,6 +6,7 @@ use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt};
 use std::path::Path;
 use std::sync::Arc;
 
+use crate::host::standard;
 use crate::{Error, Result};
 
 /// A file's path, and which file was there in which state.
@@ -63,8 +64,8 @@ impl Origin {
 
     /// Fails if the file at the path is another one by now, or has changed.
     pub fn unchanged(&self) -> Result<()> {
-        let now =
-            fs::metadata(&self.path).map_err(|e| Error::io(&self.path, "find it again", e))?;
+        let there = standard::opened(&self.path)?;
+        let now = fs::metadata(there).map_err(|e| Error::io(&self.path, "find it again", e))?;
         self.compare(FileState::of(&now))
     }
 
@@ -101,12 +102,13 @@ impl Origin {
 /// happen.
 pub fn open_plain(path: &Path) -> Result<(File, Metadata)> {
     let opening = |e| Error::io(path, "open it", e);
-    plain(path, fs::metadata(path).map_err(opening)?)?;
+    let there = standard::opened(path)?;
+    plain(path, fs::metadata(&there).map_err(opening)?)?;
     let without_waiting = rustix::fs::OFlags::NONBLOCK | rustix::fs::OFlags::NOCTTY;
     let file = OpenOptions::new()
         .read(true)
         .custom_flags(without_waiting.bits().cast_signed())
-        .open(path)
+        .open(there)
         .map_err(opening)?;
     let about = file.metadata().map_err(|e| Error::io(path, "read its length", e))?;
     plain(path, about).map(|about| (file, about))

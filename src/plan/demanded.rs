@@ -9,11 +9,11 @@ use super::sorted::{Sorted, blame};
 use crate::budget::Bytes;
 use crate::engine::pass::{ColumnBytes, Op, Pass, standings};
 use crate::engine::shares::Demands;
-use crate::engine::{by_input, by_rank, by_square};
+use crate::engine::{by_input, by_rank, by_split};
 use crate::graph::{MOST_THREADS, RunSettings};
 use crate::host::process::{default_memory, processors};
 use crate::point::{ComputedDimension, Metadata, Schema};
-use crate::stage::{ChunkSize, CreateSink, Source};
+use crate::stage::{ChunkSize, CreateSink, OutputSplit, Source};
 use crate::{Error, Result};
 
 /// What a run depends on in its memory, but the
@@ -57,15 +57,15 @@ fn is_plain(sorted: &Sorted, (source, schema): (&dyn Source, &Arc<Schema>)) -> R
     Ok(sizes.iter().any(|[each, _]| *each > 0))
 }
 
-/// Bytes of the lists of outputs that are a file for each input, or one for each square.
+/// Bytes of the lists of outputs that are a file for each input, or that are split.
 pub(super) fn lists_bytes(
     each: &[Vec<Box<dyn CreateSink>>],
-    sides: &[Option<f64>],
+    splits: &[Option<OutputSplit>],
     ranks: &[u32],
 ) -> Bytes {
     let folders = each.iter().filter(|each| !each.is_empty()).count() as u64;
-    let squares = sides.iter().flatten().count() as u64;
-    by_input::lists_bytes(ranks.len()) * folders + by_square::lists_bytes() * squares
+    let split = splits.iter().flatten().count() as u64;
+    by_input::lists_bytes(ranks.len()) * folders + by_split::lists_bytes() * split
 }
 
 /// Threads that work at once.

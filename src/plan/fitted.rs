@@ -13,7 +13,7 @@ use super::look::{Unfit, look, look_at_corners};
 use super::meshes::{connected, triangulations};
 use super::order::WriteOrder;
 use super::passes::{Passes, unroll};
-use super::places::{all_read, check_places, copies, each_input, square_sides};
+use super::places::{all_read, check_places, copies, each_input, splits};
 use super::sorted::{Sorted, blame};
 use super::stretch::Stretch;
 use super::told::ToldGraph;
@@ -117,13 +117,13 @@ impl Graph {
         let read = all_read(&*sorted.source.1, &*source);
         let mut files = right(places(&read, &sorted.sinks))?;
         let (each, ranks) = each_input(&*source, &sorted.sinks, &settings, &mut files)?;
-        let (sides, wide) = square_sides(&*source, &sorted.sinks, &settings, &read)?;
+        let (splits, wide) = splits((&*source, schema), &sorted.sinks, &settings, &read)?;
         let beside = copies(&*source, &sorted.sinks, &each, &settings, &mut files)?;
         let tagger = tagger(&sorted.ops, &passes.passes, &choices, &ranks, schema, &settings)?;
         let order = WriteOrder::new(&sorted, &*source)?;
         let (lattice, doubt) = lattice(&settings, (&*source, schema), &sorted.ops, order.mills)?;
         let demands = demands(&sorted, &passes, (&*source, schema), &order, &settings)?;
-        let besides = (lists_bytes(&each, &sides, &ranks), connected(&sorted, &*source));
+        let besides = (lists_bytes(&each, &splits, &ranks), connected(&sorted, &*source));
         let demands = divided(demands, besides, tagger.tags())?;
         let mut warnings = warnings(&*source, &sorted, &schemas, &settings)?;
         warnings.extend(doubt.into_iter().chain(wide));
@@ -149,7 +149,7 @@ impl Graph {
             computed: passes.computed,
             in_input_order: order.in_input_order,
             each,
-            sides,
+            splits,
             given,
             beside,
             ranks,

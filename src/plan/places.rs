@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 
 use crate::engine::beside::Beside;
 use crate::engine::by_input::ranks;
-use crate::engine::by_square::MOST_SQUARES;
+use crate::engine::by_split::MOST_FILES;
 use crate::engine::publish::{check_place, folder_of, refuse_existing};
 use crate::error::shown;
 use crate::graph::RunSettings;
 use crate::host::{Clash, Files, Use};
+use crate::point::Schema;
 use crate::report::Grouped;
-use crate::stage::{CreateSink, OpenSource, Source};
+use crate::stage::{CreateSink, OpenSource, OutputSplit, Source};
 use crate::store::TAGGED_INPUTS;
 use crate::{Error, ErrorKind, Result};
 
@@ -29,7 +30,7 @@ pub(super) fn check_places(
     inputs.iter().for_each(|path| files.read(path, Use::Input));
     let files_of = sinks.iter().filter(|sink| sink.is_file());
     // Those of several files are looked at when these are known.
-    let outputs = files_of.map(|sink| (sink.path(), sink.is_folder() || sink.has_squares()));
+    let outputs = files_of.map(|sink| (sink.path(), sink.is_folder() || sink.is_split()));
     let mut wrong = Vec::new();
     for (path, is_several) in outputs.chain(settings.report.as_deref().map(|path| (path, false))) {
         match files.write(path) {
@@ -111,52 +112,68 @@ pub(super) fn each_input(
     Ok((each, if folders { ranks(&inputs) } else { Vec::new() }))
 }
 
-/// For each sink the side of the squares that it is cut into, and what users should know of these.
-pub(super) type SquareSides = (Vec<Option<f64>>, Vec<String>);
+/// For each sink into which files it is split, and what users should know of these.
+pub(super) type Splits = (Vec<Option<OutputSplit>>, Vec<String>);
 
-/// For each sink the side of the squares that it is cut into. Refuses squares of which one could
+/// For each sink into which files records of `schema` are split. Refuses files of which one could
 /// have the path of a file that is `read`, or that is there already and must not be replaced.
-pub(super) fn square_sides(
-    source: &dyn Source,
+pub(super) fn splits(
+    (source, schema): (&dyn Source, &Schema),
     sinks: &[Box<dyn CreateSink>],
     settings: &RunSettings,
     read: &[PathBuf],
-) -> Result<SquareSides> {
+) -> Result<Splits> {
     let units = source.metadata().units;
-    let mut wide = Vec::new();
-    let mut side = |sink: &dyn CreateSink| {
-        let Some(side) = sink.square_side(&units)? else { return Ok(None) };
+    let mut many = Vec::new();
+    let mut split = |sink: &dyn CreateSink| {
+        let Some(split) = sink.split(schema, &units)? else { return Ok(None) };
         if let Some(input) = read.iter().find(|input| sink.may_name(input)) {
-            let told = format!("a square could have the name of the input {}", shown(input));
+            let told =
+                format!("one of the files could have the name of the input {}", shown(input));
             return Err(Error::pipeline(told).at(sink.path()).help("write into another folder"));
         }
         let refer = source.inputs().into_iter().find(|input| input.beside.is_some());
         if let Some(input) = refer {
             let told = "its records refer to waveforms in a file beside it, which has no copy \
-                        beside each square";
+                        beside each of several outputs";
             return Err(Error::pipeline(told).at(&input.path).help("write one file"));
         }
-        let area = source.claimed_box();
-        wide.extend(area.and_then(|area| too_many(area, side, sink.path())));
+        many.extend(too_many(source, &split, sink.path()));
         let there = std::fs::read_dir(folder_of(sink.path())).into_iter().flatten().flatten();
         let there = there.map(|entry| entry.path()).find(|path| sink.may_name(path));
         there.map_or(Ok(()), |path| refuse_existing(&path, settings.existing))?;
-        Ok(Some(side))
+        Ok(Some(split))
     };
-    let sides = sinks.iter().map(|sink| side(&**sink)).collect::<Result<_>>()?;
-    Ok((sides, wide))
+    let splits = sinks.iter().map(|sink| split(&**sink)).collect::<Result<_>>()?;
+    Ok((splits, many))
 }
 
-/// What to say where the box that headers claim has more squares than may have points.
-fn too_many([lo, hi]: [[f64; 3]; 2], side: f64, path: &Path) -> Option<String> {
-    let [columns, rows] = [0, 1].map(|axis| ((hi[axis] - lo[axis]) / side).ceil().max(1.0));
-    let (most, all) = (MOST_SQUARES, columns * rows);
-    (all > most as f64).then(|| {
-        format!(
-            "{}: the box of the input's header has {} squares of `write.side = {side}`; the run \
-             fails if more than {most} of them have points",
-            shown(path),
-            Grouped(all as u64)
-        )
-    })
+/// What to say where headers claim that there are more files than there may be.
+fn too_many(source: &dyn Source, split: &OutputSplit, path: &Path) -> Option<String> {
+    let (path, most) = (shown(path), MOST_FILES);
+    match split {
+        OutputSplit::Squares(side) => {
+            let [lo, hi] = source.claimed_box()?;
+            let [columns, rows] = [0, 1].map(|axis| ((hi[axis] - lo[axis]) / side).ceil().max(1.0));
+            let all = columns * rows;
+            (all > most as f64).then(|| {
+                let all = Grouped(all as u64);
+                format!(
+                    "{path}: the box of the input's header has {all} squares of `write.side = \
+                     {side}`; the run fails if more than {most} of them have points"
+                )
+            })
+        }
+        OutputSplit::Points(points) => {
+            let all = source.points().div_ceil(*points);
+            (all > most as u64).then(|| {
+                let all = Grouped(all);
+                format!(
+                    "{path}: the input's points are {all} files of `write.points = {points}`; the \
+                     run fails if more than {most} are to be written"
+                )
+            })
+        }
+        OutputSplit::Values(_) | OutputSplit::Bytes(_) => None,
+    }
 }

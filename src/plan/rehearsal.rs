@@ -56,8 +56,8 @@ pub(super) fn rehearsed(
     let mut rehearse = |role: Role| {
         Ok(match role {
             Role::Sink(sink) => {
-                let of_one = match sink.square_side(&source.metadata().units)? {
-                    Some(side) => Some(sink.of_square([0, 0], side)?),
+                let of_one = match sink.split(source.schema(), &source.metadata().units)? {
+                    Some(split) => Some(sink.of_split([0, 0], &split)?),
                     None => sink.each_input(inputs)?.and_then(|each| each.into_iter().next()),
                 };
                 number += 1;
@@ -87,10 +87,10 @@ pub(super) fn rehearsed(
 }
 
 /// A sink that writes what another would into a scratch file, and enters how much that was. Where
-/// each input or each square has an output, it writes one for all.
+/// each input has an output or one is split, it writes one for all.
 struct RehearsedSink {
     sink: Box<dyn CreateSink>,
-    /// That of the first input or of a square, where each has one.
+    /// That of the first input or of a split, where there is one.
     of_one: Option<Box<dyn CreateSink>>,
     number: usize,
     scratch: Arc<Scratch>,

@@ -10,6 +10,7 @@ mod fraction;
 mod length;
 mod schema;
 mod setting;
+mod size;
 mod turn;
 mod whole;
 
@@ -22,5 +23,7 @@ pub use fraction::Fraction;
 pub use length::Length;
 pub(crate) use schema::{COUNT_TEXT, OrNone, has_schema, or_word};
 pub use setting::Setting;
+pub use size::parse_bytes;
+pub(crate) use size::{SizeText, some_bytes};
 pub use turn::Turn;
 pub(crate) use whole::Whole;

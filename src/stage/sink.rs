@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::source::{Input, Source};
+use super::split::{OutputSplit, SplitKey};
 use super::walk::PointWalk;
 use crate::geom::lattice::Lattice;
 use crate::point::{Bounds, Metadata, PointBatch, Position, Schema, Units};
@@ -220,33 +221,34 @@ pub trait CreateSink: Send + Sync {
         Ok(None)
     }
 
-    /// True if the output is cut into squares: its [`path`](CreateSink::path) is the pattern of
-    /// their names, and their folder is made by the run.
-    fn has_squares(&self) -> bool {
+    /// True if the output is split: its [`path`](CreateSink::path) is the pattern of the names of
+    /// its files, and their folder is made by the run.
+    fn is_split(&self) -> bool {
         false
     }
 
-    /// The side of the squares, in the unit of x and y, if the output is cut into a file for each
-    /// square of the plane that has points: this sink then is not created, but those
-    /// [of its squares](CreateSink::of_square), each when its records are known.
+    /// Into which files records of `schema` are split, if they are, where coordinates have these
+    /// units: this sink then is not created, but those [of its files](CreateSink::of_split), each
+    /// when its records are known.
     ///
     /// # Errors
     ///
-    /// A side in a unit of its own where that of the scan is not known.
-    fn square_side(&self, _units: &Units) -> Result<Option<f64>> {
+    /// A side in a unit of its own where that of the scan is not known, and a dimension that the
+    /// records lack.
+    fn split(&self, _schema: &Schema, _units: &Units) -> Result<Option<OutputSplit>> {
         Ok(None)
     }
 
-    /// The sink of the square so many sides of `side` from the origin along x and y.
+    /// The sink of one file of a split.
     ///
     /// # Errors
     ///
-    /// If the output is not cut into squares.
-    fn of_square(&self, _square: [i64; 2], _side: f64) -> Result<Box<dyn CreateSink>> {
-        Err(Error::internal("an output that is one file has no squares").at(self.path()))
+    /// If the output is not split.
+    fn of_split(&self, _key: SplitKey, _split: &OutputSplit) -> Result<Box<dyn CreateSink>> {
+        Err(Error::internal("an output that is one file is not split").at(self.path()))
     }
 
-    /// True if a file of one of its squares could have this path.
+    /// True if a file of its split could have this path.
     fn may_name(&self, _path: &Path) -> bool {
         false
     }

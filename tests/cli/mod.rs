@@ -15,6 +15,7 @@ mod preview;
 mod reproduce;
 mod rules;
 mod size;
+mod streams;
 mod tools;
 mod validate;
 mod values;

@@ -135,7 +135,54 @@ fn counts_and_records_that_lie_are_read_around() {
         2,
         &["--on-error", "salvage"],
     );
-    fs::write(at.join("a.xyz"), "1 2 3\n").unwrap();
-    let text = ["convert", "a.xyz", "-o", "o.ply", "--on-error", "skip"];
-    fails(at, &text, 2, &["--on-error", "las"]);
+    fs::write(at.join("a.obj"), "v 1 2 3\n").unwrap();
+    let other = ["convert", "a.obj", "-o", "o.ply", "--on-error", "skip"];
+    fails(at, &other, 2, &["--on-error", "las, laz, copc, ply"]);
+}
+
+/// The same LAZ file whose header counts so many points.
+fn counting(at: &Path, laz: &str, points: u32) -> String {
+    let mut bytes = fs::read(at.join(laz)).unwrap();
+    let old = u32::from_le_bytes(bytes[107..111].try_into().unwrap());
+    if bytes[25] == 4 {
+        bytes[247..255].copy_from_slice(&u64::from(points).to_le_bytes());
+    }
+    if old > 0 {
+        bytes[107..111].copy_from_slice(&points.to_le_bytes());
+    }
+    let name = format!("{points}-{laz}");
+    fs::write(at.join(&name), bytes).unwrap();
+    name
+}
+
+#[test]
+fn laz_that_counts_fewer_points_than_its_chunks_have_gives_all_of_them() {
+    let at = scan();
+    let at = at.path();
+    // Layered chunks, and those of old point formats, of which the last does not say its count.
+    let old = ["convert", "whole.laz", "-o", "old.laz", "--point-format", "1", "--no-provenance"];
+    let old = [&old[..], &["--drop", "Overlap,ScannerChannel"]].concat();
+    let (code, _, told) = pointmill(at, &old);
+    assert_eq!(code, 0, "{told}");
+    for laz in ["whole.laz", "old.laz"] {
+        let whole = read(&at.join(laz)).1;
+        for points in [0, 1, 70_000, 129_999] {
+            let name = counting(at, laz, points);
+            let (told, records, all) = run(at, &name, "salvage");
+            let more = ["130,000", "129,999", "60,000", "1"];
+            let more = more[[0, 1, 70_000, 129_999].iter().position(|n| *n == points).unwrap()];
+            assert!(told.contains(&format!("{more} points behind the ")), "{name}: {told}");
+            assert!(records == whole && all.is_empty(), "{name}");
+        }
+        let name = counting(at, laz, 0);
+        fails(at, &["convert", &name, "-o", "o.las"], 1, &["counts no points", "--on-error salv"]);
+    }
+    let case = case_file("80j-count-fewer.laz");
+    fs::copy(case, at.join("80j.laz")).unwrap();
+    let points = |how: &str| {
+        let records = run(at, "80j.laz", how).1;
+        records.len() / read(&at.join("out.las")).0.stride
+    };
+    assert_eq!((points("fail"), points("skip")), (1_100, 1_100));
+    assert!(points("salvage") >= 1_200);
 }

@@ -2,4 +2,5 @@
 
 mod io;
 mod run;
+mod split;
 mod squares;

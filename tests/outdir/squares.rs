@@ -144,7 +144,7 @@ fn patterns_that_cannot_be_are_refused_before_the_run() {
     let path = |name: &str| format!("path = '{}'", case.path(name).display());
     let told = |settings: &str, write: String| run(settings, &input, "", &write).unwrap_err();
     for (write, says, help) in [
-        (path("{x}_{y}.ply"), "no `write.side` says how large", "side = \"500 m\""),
+        (path("{x}_{y}.ply"), "nothing says into which files", "side = \"500 m\""),
         (format!("{}\nside = 5", path("out.ply")), "names no file for each", "{x}_{y}.ply"),
         (format!("{}\nside = 5", path("{x}.ply")), "names no file for each", "{x}_{y}.ply"),
         (format!("{}\nside = 5", path("{x}/{x}_{y}.ply")), "names no file", "{x}_{y}.ply"),

@@ -47,10 +47,11 @@ impl ReduceArguments {
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ReduceArguments {
-    /// Files of points, patterns or folders, or @LIST: a text with one of them a line
+    /// Files of points, patterns or folders, or @LIST: a text with one of them a line; or - for
+    /// standard input
     #[arg(value_name = "IN", required = true)]
     pub inputs: Vec<String>,
-    /// The reduced file: .las, .laz or .ply
+    /// The reduced file: .las, .laz or .ply; or - for standard output, with --to
     #[arg(short, long, value_name = "OUT", required_unless_present_any = ["outdir", "preview"])]
     pub output: Option<String>,
     /// One reduced file for each input instead, in this folder, under the input's name and header;

@@ -102,7 +102,7 @@ pub(crate) struct ReadArguments {
     /// points]
     #[arg(long, value_name = "LENGTH")]
     pub resolution: Option<String>,
-    /// What is done about damaged LAS and LAZ: fail; skip what is damaged, of LAZ whole chunks; or
+    /// What is done about damaged files: fail; skip what is damaged, of LAZ whole chunks; or
     /// salvage what can be read, also of damaged chunks. What is lost is told [default: fail]
     #[arg(long, value_name = "HOW")]
     pub on_error: Option<String>,

@@ -11,9 +11,10 @@ use super::names::{CALLED, MAGIC};
 use super::pose::Pose;
 use super::reading::Windowed;
 use crate::error::shown;
+use crate::io::damage::Losses;
 use crate::io::origin::Origin;
 use crate::report::Grouped;
-use crate::stage::foreign;
+use crate::stage::{OnError, foreign};
 use crate::{Error, Result};
 
 /// One scan of a file.
@@ -38,6 +39,8 @@ pub(super) struct E57File {
     pub scans: Vec<E57Scan>,
     pub crs: Option<String>,
     pub warnings: Vec<String>,
+    /// What is lost of it.
+    pub losses: Losses,
 }
 
 /// The error of a file that the crate cannot read.
@@ -55,7 +58,7 @@ pub(super) fn reader(path: &Path, origin: &Origin) -> Result<E57Reader<Windowed>
 
 impl E57File {
     /// Reads what the file says of its scans; `chosen` are the numbers of those that are read.
-    pub fn open(path: &Path, chosen: Option<&[u64]>) -> Result<E57File> {
+    pub fn open(path: &Path, chosen: Option<&[u64]>, on_error: OnError) -> Result<E57File> {
         let (file, origin) = Origin::open(path)?;
         let mut first = [0; MAGIC.len()];
         let is_e57 = origin.length() >= first.len() as u64 && {
@@ -87,7 +90,8 @@ impl E57File {
         let scans = (1..).zip(all).filter(|(n, _)| is_chosen(n));
         let scans = scans.map(|(number, cloud)| scan(path, origin.length(), number, cloud));
         let scans = scans.collect::<Result<Vec<_>>>()?;
-        Ok(E57File { path: path.to_owned(), origin, scans, crs, warnings })
+        let losses = Losses::new(on_error);
+        Ok(E57File { path: path.to_owned(), origin, scans, crs, warnings, losses })
     }
 
     /// Points that were met so far and have no coordinates.

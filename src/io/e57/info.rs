@@ -9,6 +9,7 @@ use super::file::{E57File, reader};
 use crate::Result;
 use crate::io::describe::json;
 use crate::io::origin::Origin;
+use crate::stage::OnError;
 
 /// What begins a scan's description that says how the file was made.
 pub(super) const NOTE: &str = "pointmill: ";
@@ -49,7 +50,7 @@ pub(super) fn name(name: &RecordName) -> String {
 ///
 /// As opening it.
 pub(super) fn describe(path: &Path) -> Result<serde_json::Value> {
-    let file = E57File::open(path, None)?;
+    let file = E57File::open(path, None, OnError::Fail)?;
     let opened = reader(path, &file.origin)?;
     let scans = file.scans.iter().map(|scan| E57ScanFacts {
         name: scan.cloud.name.clone(),

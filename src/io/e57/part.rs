@@ -9,6 +9,7 @@ use super::fields::{Meaning, plain};
 use super::file::{E57File, E57Scan, reader, unreadable};
 use super::names::RECORDS;
 use super::reading::Windowed;
+use crate::io::damage::PartLosses;
 use crate::point::names::{NORMAL, POINT_SOURCE_ID};
 use crate::point::{Dimension, Endian, PointBatch, Schema, Value};
 use crate::stage::Part;
@@ -53,6 +54,10 @@ pub(super) struct E57Part<'a> {
     stride: usize,
     /// Points without coordinates so far.
     invalid: u64,
+    /// Points that were read, and what is lost of the others.
+    read: u64,
+    losses: PartLosses,
+    is_over: bool,
 }
 
 impl<'a> E57Part<'a> {
@@ -110,6 +115,9 @@ impl<'a> E57Part<'a> {
             source,
             stride,
             invalid: 0,
+            read: 0,
+            losses: file.losses.part(),
+            is_over: false,
         })
     }
 
@@ -117,15 +125,21 @@ impl<'a> E57Part<'a> {
         batch.source = self.source;
         batch.clear();
         let mut record = vec![0; self.stride];
-        while batch.len() < batch.capacity() {
+        while !self.is_over && batch.len() < batch.capacity() {
             let next = self.points.with_dependent_mut(|_, points| points.next());
             let Some(values) = next else { break };
+            record.fill(0);
             let values = values.map_err(|cause| {
                 let told = format!("scan {}: a point is not read", self.scan.number);
                 unreadable(&self.file.path, &told, cause)
-            })?;
-            record.fill(0);
-            match self.point(&values, &mut record)? {
+            });
+            let point = values.and_then(|values| self.point(&values, &mut record));
+            let point = match point {
+                Ok(point) => point,
+                Err(error) => return self.give_up(error),
+            };
+            self.read += 1;
+            match point {
                 true => batch.extend(&record),
                 false => {
                     self.invalid += 1;
@@ -133,6 +147,17 @@ impl<'a> E57Part<'a> {
                 }
             }
         }
+        Ok(())
+    }
+
+    /// Goes on without the points that are left of the scan, if that is wanted: where they begin is
+    /// not known.
+    fn give_up(&mut self, error: Error) -> Result<()> {
+        let left = self.scan.cloud.records.saturating_sub(self.read);
+        let byte = self.scan.cloud.file_offset;
+        self.losses.lose(&self.file.path, byte, left, error)?;
+        self.file.losses.enter(self.scan.number as usize, &self.losses);
+        self.is_over = true;
         Ok(())
     }
 

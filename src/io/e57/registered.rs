@@ -40,7 +40,7 @@ impl Format for E57Format {
     }
 
     fn read_keys(&self) -> &'static [&'static str] {
-        &["scans"]
+        &["scans", "on_error"]
     }
 
     fn open(&self, files: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn Source>> {

@@ -11,11 +11,12 @@ use super::names::RECORDS;
 use super::part::E57Part;
 use super::reading::Windowed;
 use crate::error::shown;
+use crate::io::damage::told;
 use crate::io::rows::schema::placed;
 use crate::io::systems;
 use crate::point::names::{POINT_SOURCE_ID, XYZ};
 use crate::point::{Endian, Metadata, Scalar, Schema};
-use crate::report::Grouped;
+use crate::report::{Grouped, LostPoints};
 use crate::stage::{Input, Part, ReadKeys, Source};
 use crate::{Error, Result};
 
@@ -29,7 +30,7 @@ const SCANS_MOST: usize = u16::MAX as usize;
 /// A file that is no E57 or damaged, a scan without coordinates, more points than the file could
 /// hold.
 pub(super) fn open(paths: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn Source>> {
-    let files = paths.iter().map(|path| E57File::open(path, keys.scans.as_deref()));
+    let files = paths.iter().map(|path| E57File::open(path, keys.scans.as_deref(), keys.on_error));
     let files = files.collect::<Result<Vec<_>>>()?;
     let Some(first) = files.first() else {
         return Err(Error::pipeline("no E57 file to read"));
@@ -129,7 +130,9 @@ impl Source for E57Source {
     }
 
     fn inputs(&self) -> Vec<Input> {
-        let found = |file: &E57File| file.points().saturating_sub(file.invalid());
+        let found = |file: &E57File| {
+            file.points().saturating_sub(file.invalid() + file.losses.while_read())
+        };
         self.files.iter().map(|file| Input::new(&file.path, found(file))).collect()
     }
 
@@ -170,10 +173,17 @@ impl Source for E57Source {
         let invalid = |file: &E57File| {
             let invalid = file.invalid();
             let (points, path) = (Grouped(file.points()), shown(&file.path));
-            let told =
-                |n| format!("{path}: {n} of {points} points are said to have no coordinates");
-            (invalid > 0).then(|| told(Grouped(invalid)))
+            (invalid > 0).then(|| {
+                let n = Grouped(invalid);
+                format!("{path}: {n} of {points} points are said to have no coordinates")
+            })
         };
-        self.warnings.iter().cloned().chain(self.files.iter().filter_map(invalid)).collect()
+        let lost = self.files.iter().flat_map(|file| told(&file.losses.all()));
+        let found = self.files.iter().filter_map(invalid).chain(lost);
+        self.warnings.iter().cloned().chain(found).collect()
+    }
+
+    fn lost(&self) -> Vec<LostPoints> {
+        self.files.iter().flat_map(|file| file.losses.all()).collect()
     }
 }

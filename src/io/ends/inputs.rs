@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use super::list::paths_in;
 use crate::error::{listed, shown, whereabouts};
+use crate::host::standard;
 use crate::stage::Formats;
 use crate::{Error, ErrorKind, Result};
 
@@ -90,7 +91,7 @@ fn one(path: &str, formats: &Formats) -> Result<Vec<PathBuf>> {
     if !pattern || literal.exists() {
         return match path {
             "" => Err(Error::pipeline("a path is empty")),
-            _ => Ok(vec![literal.to_owned()]),
+            _ => Ok(vec![standard::input(path)]),
         };
     }
     if path.len() > LONGEST {

@@ -9,14 +9,19 @@ use super::values::{
     names_once, offset_or_auto, one_or_more, one_or_three, some_columns, some_crs, some_positive,
     some_scale, some_scans, texts, three_or_auto,
 };
-use crate::quantity::{CropBox, Length, Setting, Whole};
+use crate::quantity::{CropBox, Length, Setting, SizeText, Whole, some_bytes};
 use crate::stage::{
-    Assumption, Colors, FloatIntensity, FormatName, OnError, Order, OutputEncoding, ReadKeys,
-    Renamed, Retyped, Separator, WriteKeys,
+    Assumption, Colors, FloatIntensity, FormatName, OnError, OutputEncoding, Renamed, Retyped,
+    Separator,
 };
 
 /// The source of most pipelines. Several files are one scan, all of one format; LAS and LAZ count
 /// as one, and so do texts.
+///
+/// The path `-` is standard input. What a pipe gives is set down first, in a file of no name in the
+/// folder that `TMPDIR` names, or `/tmp`, which needs room for all of it: a scan is read at many
+/// places. A file that the shell opens (`< scan.laz`) is read where it is. The first bytes say the
+/// format, of a text `format` does.
 ///
 /// Headers are read, compared and held against the files' lengths before any point is. Files that
 /// do not fit together are refused by name: their points hold the same. LAS inputs agree in point
@@ -82,7 +87,7 @@ use crate::stage::{
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Read {
-    /// A file, a pattern, a folder, or a list of them.
+    /// A file, a pattern, a folder, `-` for standard input, or a list of them.
     #[serde(deserialize_with = "one_or_more")]
     #[schemars(schema_with = "texts")]
     pub path: Vec<String>,
@@ -109,12 +114,13 @@ pub struct Read {
     /// description, else 0.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub assume: Vec<Assumption>,
-    /// What is done about damage in LAS and LAZ: `"fail"`; `"skip"`, which leaves out what is
-    /// damaged, of LAZ whole chunks; `"salvage"`, which reads what can be read, also of a damaged
-    /// chunk the points before the damage shows, of which the last may be wrong. A file that ends
-    /// too early has as many points as it holds, one whose header counts too few has those behind
-    /// them as well, and variable length records that are cut off are left out. What is lost is
-    /// told, and counted in the report.
+    /// What is done about damage: `"fail"`; `"skip"`, which leaves out what is damaged, of LAZ
+    /// whole chunks; `"salvage"`, which reads what can be read, also of a damaged chunk the points
+    /// before the damage shows, of which the last may be wrong. A file that ends too early has as
+    /// many points as it holds; LAS and LAZ whose header counts too few have those behind them as
+    /// well, and variable length records that are cut off are left out. Of a text a line that is no
+    /// point is left out, of an E57 file the rest of the scan. What is lost is told, and counted in
+    /// the report.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub on_error: Option<OnError>,
     /// Where points of LAS, LAZ and COPC are read: `[x0, y0, x1, y1]`, or
@@ -149,6 +155,10 @@ pub type ScanNumber = Whole<1, 65_535>;
 
 /// The end of every pipeline. The file grows in a scratch folder beside its place and appears under
 /// its name when it is complete; it never replaces an input.
+///
+/// The path `-` is standard output; `format` says what is written. The file grows in the folder
+/// that `TMPDIR` names, or `/tmp`, and is sent when it is complete, so that every format can be
+/// sent, and nothing of a run that fails is.
 ///
 /// A record that is kept is the input's, byte for byte, wherever the format can hold it. From one
 /// format to another every field keeps its name; one that cannot be held is an error unless `drop`
@@ -197,16 +207,33 @@ pub type ScanNumber = Whole<1, 65_535>;
 /// inputs are one scan all the same: neighbourhoods and cells go on from file to file, and the
 /// outputs together have the points that the one file would have.
 ///
-/// With `side` the output is cut into a file for each square of the plane that has points, of which
-/// `path` is the pattern: `path = "tiles/{x}_{y}.laz"` with `side = "500 m"` writes
-/// `tiles/638000_4851500.laz` and so on, named by the smallest x and y of each square. A point on a
-/// border is in the square of larger coordinates. Squares begin at the origin of the coordinates,
-/// so that those of neighbouring scans fit together. The points of a square have the order that
-/// they would have in one file. Up to 16,384 squares may have points.
+/// # Splitting
+///
+/// An output may be split into several files, of which `path` is the pattern; the folder is made if
+/// it does not exist. Records that are split have the order that they would have in one file, and
+/// the files have all of them. There may be up to 16,384 files. Records are set down in scratch by
+/// file before the files are written, so that the disk needs room for them once more.
+///
+/// With `side` there is a file for each square of the plane that has points:
+/// `path = "tiles/{x}_{y}.laz"` with `side = "500 m"` writes `tiles/638000_4851500.laz` and so on,
+/// named by the smallest x and y of each square. A point on a border is in the square of larger
+/// coordinates. Squares begin at the origin of the coordinates, so that those of neighbouring scans
+/// fit together.
+///
+/// With `by` there is a file for each value of a dimension whose numbers are whole:
+/// `path = "lines/{value}.laz"` with `by = "PointSourceId"` writes a file for each flight line, and
+/// with `by = "Classification"` one for each class.
+///
+/// With `points` a file has so many points, and the last what is left: `path = "part_{number}.laz"`
+/// with `points = "10M"` writes `part_0001.laz` and so on. With `bytes` a file is no longer than
+/// that, as it lies on the disk: it has as many of the chunks that the format is written in (50,000
+/// points of LAS and LAZ, fewer of others) as fit, with 256 KiB and a hundredth to spare. Chunks
+/// are encoded twice for that: once to see how long they are.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Write {
-    /// The file; it appears under this name when it is complete. Either this or `folder` is given.
+    /// The file, which appears under this name when it is complete; `-` for standard output. Either
+    /// this or `folder` is given.
     #[serde(default)]
     #[schemars(title = "a path")]
     pub path: Option<PathBuf>,
@@ -218,6 +245,19 @@ pub struct Write {
     /// the corner of a square is to stand.
     #[serde(default)]
     pub side: Option<Length>,
+    /// Dimension of the records whose values get a file each, such as `PointSourceId`; none: one
+    /// file. `path` has `{value}` where the value is to stand.
+    #[serde(default)]
+    pub by: Option<String>,
+    /// Points of a file, where there is to be one after another; none: one file. `path` has
+    /// `{number}` where the number of the file is to stand, from 1.
+    #[serde(default)]
+    pub points: Option<FilePoints>,
+    /// Bytes of a file at most, where there is to be one after another; none: one file. `path` has
+    /// `{number}` where the number of the file is to stand, from 1.
+    #[serde(default, deserialize_with = "some_bytes")]
+    #[schemars(with = "Option<SizeText>")]
+    pub bytes: Option<u64>,
     /// The format; none: as the extension says, in a folder that of the input. A file whose
     /// extension says another is written, with a warning.
     #[serde(default)]
@@ -283,6 +323,9 @@ pub struct Write {
     pub header: Option<bool>,
 }
 
+/// How many points a file gets.
+pub type FilePoints = Whole<1, 1_000_000_000_000>;
+
 /// The number of a point data record format.
 pub type PointFormat = Whole<0, 10>;
 
@@ -300,62 +343,4 @@ pub enum OutputOrder {
     /// on the order of the inputs; a scan that is marked has its records where the input has them.
     /// For `path` alone.
     Input,
-}
-
-impl Write {
-    /// The order as stages know it.
-    pub(crate) fn stage_order(&self) -> Order {
-        match self.order {
-            None => Order::Auto,
-            Some(OutputOrder::Canonical) => Order::Canonical,
-            Some(OutputOrder::Input) => Order::Input,
-        }
-    }
-}
-
-impl Write {
-    /// What formats know of it.
-    pub(super) fn keys(&self, path: PathBuf) -> WriteKeys {
-        WriteKeys {
-            path,
-            computed: self.dimensions.clone(),
-            drop: self.drop.clone(),
-            map: self.map.clone(),
-            types: self.types.clone(),
-            scale: self.scale,
-            offset: self.offset,
-            point_format: self.point_format.map(format_number),
-            intensity: self.intensity,
-            encoding: self.encoding,
-            colors: self.colors,
-            separator: self.separator,
-            decimals: self.decimals.map(|decimals| decimals.get() as u8),
-            header: self.header,
-        }
-    }
-}
-
-impl Read {
-    /// What formats know of it.
-    pub(super) fn keys(&self) -> ReadKeys {
-        let mut keys = ReadKeys::default();
-        keys.columns.clone_from(&self.columns);
-        let scans = self.scans.as_ref();
-        keys.scans = scans.map(|scans| scans.iter().map(|number| number.get()).collect());
-        keys.crs.clone_from(&self.crs);
-        keys.assume.clone_from(&self.assume);
-        keys.on_error = self.on_error.unwrap_or_default();
-        keys.bounds.clone_from(&self.bounds);
-        keys.resolution = self.resolution;
-        (keys.scale, keys.offset) = (self.scale, self.offset);
-        keys.point_format = self.point_format.map(format_number);
-        keys
-    }
-}
-
-fn format_number(format: Setting<PointFormat>) -> Setting<u8> {
-    match format {
-        Setting::Auto => Setting::Auto,
-        Setting::Given(format) => Setting::Given(format.get() as u8),
-    }
 }

@@ -1,20 +1,21 @@
 //! The stages at both ends of a pipeline that name files, `read` and `write`: from their keys to
 //! sources and sinks of formats.
 
+mod checked;
 mod connect;
 mod discard;
 mod inputs;
+mod keys;
 mod kinds;
 mod list;
 mod mesh;
 #[cfg(feature = "cli")]
 mod mirror;
 mod outputs;
-mod refused;
 mod reshaped;
 mod roles;
 mod settled;
-mod squares;
+mod split;
 mod values;
 
 pub(crate) use discard::CountedSink;

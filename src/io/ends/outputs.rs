@@ -5,10 +5,11 @@ use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::checked::{check, unknown_extension};
 use super::connect::OutputFile;
-use super::refused::{check, unknown_extension};
 use super::settled::settled;
 use crate::error::shown;
+use crate::host::standard;
 use crate::point::{Metadata, PointBatch, Schema};
 use crate::stage::{
     ChunkSize, CreateSink, Format, Formats, Input, Order, PointWalk, ReadKeys, Sink, Source,
@@ -73,6 +74,10 @@ impl Outputs {
     /// The output of the input at `path`: its name, with the extension of the format that is asked
     /// for unless it says that already.
     fn of(&self, input: &Path) -> Result<OutputFile> {
+        if standard::is_input(input) {
+            let told = "standard input has no name that its output in a folder could have";
+            return Err(Error::pipeline(told).help("give a file as `write.path` instead"));
+        }
         let told = self.formats.of(input);
         let unknown = || unknown_extension(input, "write.format", &self.formats);
         let format = self.format.as_ref().or(told).ok_or_else(unknown)?;

@@ -4,12 +4,13 @@ use std::os::unix::ffi::OsStrExt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::checked::{check, check_read, unknown_extension};
 use super::kinds::{OutputOrder, Read, Write};
 use super::outputs::Outputs;
-use super::refused::{check, check_read, unknown_extension};
-use super::squares::Squares;
+use super::split::{SplitFiles, pattern};
 use super::{connect, inputs};
 use crate::error::shown;
+use crate::host::standard;
 use crate::io::sniff::first_bytes;
 use crate::stage::{
     Format, Formats, OpenSource, Order, Role, RoleName, StageKind, StagePlace, Unread,
@@ -41,6 +42,13 @@ impl Read {
     /// The files, and a format of theirs.
     fn files(&self, formats: &Formats) -> Result<(Vec<PathBuf>, Arc<dyn Format>)> {
         let files = inputs::expand(&self.path, formats)?;
+        let piped = files.iter().find(|file| standard::is_input(file));
+        if let Some(piped) = piped
+            && first_bytes(piped)?.is_empty()
+        {
+            let help = "what should have written it failed, or nothing is piped into it";
+            return Err(Error::data(piped, "nothing came from it").help(help));
+        }
         let asked = self.format.as_ref().map(|name| formats.named(name)).transpose()?;
         let sniffed = |file: &PathBuf| formats.sniffed(&first_bytes(file).ok()?);
         let known = |file: &PathBuf| asked.or(formats.of(file)).or_else(|| sniffed(file));
@@ -93,13 +101,13 @@ impl StageKind for Write {
     const KIND: &'static str = "write";
     const ROLE: RoleName = RoleName::Sink;
     const ABOUT: &'static str =
-        "Writes a file of points, or one for each input or square of the plane.";
+        "Writes a file of points, one for each input, or several into which the points are split.";
     const MAIN: Option<&'static str> = Some("path");
     const PLACES: &'static [&'static str] = &["path", "folder"];
     const EITHER: &'static [&'static str] = &["path", "folder"];
 
     fn build(self, at: &StagePlace) -> Result<Role> {
-        match (self.path.clone(), self.folder.clone()) {
+        match (self.path.clone().map(standard::output), self.folder.clone()) {
             (Some(_), Some(_)) => {
                 let told = "`write.path` makes one file and `write.folder` one for each input: \
                             give one of them";
@@ -137,10 +145,10 @@ impl Write {
                 let told = format!("{is} has an order of its own, not that of the input");
                 return Err(at.blame("order", Error::pipeline(told)));
             }
-            if self.side.is_some() {
-                let told = format!("{is} is written as one file, not as squares");
-                let help = format!("write `{other}`, and convert the squares");
-                return Err(at.blame("side", Error::pipeline(told).help(help)));
+            if let Some((key, _)) = self.splits().first() {
+                let told = format!("{is} is written as one file, not as several");
+                let help = format!("write `{other}`, and convert the files");
+                return Err(at.blame(key, Error::pipeline(told).help(help)));
             }
         }
         let keys = self.keys(path);
@@ -152,29 +160,48 @@ impl Write {
             None => self.stage_order(),
         };
         let file = connect::OutputFile { keys, order, format, formats, of_one: false };
-        match self.side {
-            Some(side) => {
-                Squares::check(&file.keys.path).map_err(|error| at.blame("path", error))?;
-                Ok(Role::Sink(Box::new(Squares { file, side })))
+        self.split(file, at)
+    }
+
+    /// The sink of `file`, or of several into which it is split.
+    fn split(&self, file: connect::OutputFile, at: &StagePlace) -> Result<Role> {
+        let mut splits = self.splits().into_iter();
+        match (splits.next(), splits.next()) {
+            (Some((one, _)), Some((other, _))) => {
+                let told = format!("`write.{one}` and `write.{other}` both split the output");
+                let help = "give one of them, and split each of the files by the other later";
+                Err(at.blame(other, Error::pipeline(told).help(help)))
             }
-            None if Squares::is_pattern(&file.keys.path) => {
-                let told = "a path with `{x}` or `{y}` is one for each square, and no `write.side` \
-                            says how large they are";
-                let help = "give it too, such as `side = \"500 m\"`";
-                Err(at.blame("path", Error::pipeline(told).help(help)))
+            (Some((_, by)), None) => {
+                let split = SplitFiles { file, by };
+                split.check().map_err(|error| at.blame("path", error))?;
+                Ok(Role::Sink(Box::new(split)))
             }
-            None => Ok(Role::Sink(Box::new(file))),
+            (None, _) => match pattern(&file.keys.path) {
+                None => Ok(Role::Sink(Box::new(file))),
+                Some((place, key)) => {
+                    let told = format!(
+                        "a path with `{place}` is one of several, and nothing says into which \
+                         files the points are split"
+                    );
+                    let help = format!("give {key}");
+                    Err(at.blame("path", Error::pipeline(told).help(help)))
+                }
+            },
         }
     }
 
     /// The sink of a file for each input.
     fn each(&self, folder: PathBuf, at: &StagePlace) -> Result<Role> {
         let formats = at.formats();
-        if self.side.is_some() {
-            let told = "`write.side` cuts the output of `write.path` into squares, and \
-                        `write.folder` has a file for each input";
-            let help = "give a path such as `path = \"{x}_{y}.laz\"` instead of the folder";
-            return Err(at.blame("side", Error::pipeline(told).help(help)));
+        if let Some((key, by)) = self.splits().first() {
+            let told = format!(
+                "`write.{key}` splits the output of `write.path`, and `write.folder` has a file \
+                 for each input"
+            );
+            let such = by.places().join("_");
+            let help = format!("give a path such as `path = \"{such}.laz\"` instead of the folder");
+            return Err(at.blame(key, Error::pipeline(told).help(help)));
         }
         let asked = self.format.as_ref().map(|name| formats.named(name)).transpose()?;
         let keys = self.keys(folder);

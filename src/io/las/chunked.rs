@@ -4,12 +4,12 @@
 use std::sync::Arc;
 
 use super::chunks::{Chunk, layered_head};
-use super::damage::{advised, lost};
 use super::file::InputFile;
 use super::laz::{Compression, Compressor, Damage, Decoder, Layers, Why};
 use super::read::Shift;
 use super::verify::Evidence;
 use crate::error::shown;
+use crate::io::damage::{advised, lost};
 use crate::point::PointBatch;
 use crate::stage::{OnError, Part};
 use crate::{Error, ErrorKind, Result};
@@ -120,7 +120,12 @@ impl LazPart {
         let evidence = self.evidence.as_ref().filter(|_| self.on_error != OnError::Fail);
         match evidence.filter(|_| error.kind() == ErrorKind::Data) {
             Some(evidence) if points > 0 => {
-                evidence.lose_while_read(lost(&self.file, chunk.start, points, error.message()));
+                evidence.lose_while_read(lost(
+                    self.file.path(),
+                    chunk.start,
+                    points,
+                    error.message(),
+                ));
             }
             Some(evidence) => evidence.warn(format!("{error}; its points are read all the same")),
             None => return Err(advised(error)),

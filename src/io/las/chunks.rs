@@ -31,16 +31,15 @@ pub enum Chunks {
 }
 
 impl Chunks {
-    /// Finds the chunks of `file`, whose points end before byte `end`; those that are not there are
-    /// lost, if damage is mended.
+    /// Finds the chunks of `file` with so many points, which end before byte `end`; those that are
+    /// not there are lost, if damage is mended.
     pub fn read(
         file: &InputFile,
-        header: &Header,
+        (header, points): (&Header, u64),
         compression: &Compression,
         end: u64,
         mending: &mut Mending,
     ) -> Result<Self> {
-        let points = header.points();
         let start = u64::from(header.offset_to_point_data);
         if points == 0 {
             return Ok(Chunks::Known(ChunkList::default()));
@@ -124,7 +123,7 @@ pub fn uncounted(
 }
 
 /// Why a chunk table is not used.
-enum Unusable {
+pub enum Unusable {
     /// It is damaged or missing.
     Because(String),
     /// It cannot be read, so that what it says is not known, or is too long.
@@ -202,7 +201,7 @@ fn table(
 
 /// Where the chunk table is: told in front of the first chunk, or, by writers that could not go
 /// back, at the end of the file.
-fn table_start(file: &InputFile, start: u64) -> Result<Option<u64>> {
+pub fn table_start(file: &InputFile, start: u64) -> Result<Option<u64>> {
     let inside = |at: u64| {
         let room = start + TABLE_OFFSET_BYTES..=file.len().checked_sub(8)?;
         room.contains(&at).then_some(at)
@@ -223,7 +222,7 @@ fn table_start(file: &InputFile, start: u64) -> Result<Option<u64>> {
 
 /// Hands bytes and points of every chunk to `take`, as the table at byte `at` says. Stops as
 /// soon as they exceed the `room` that chunks have.
-fn entries(
+pub fn entries(
     file: &InputFile,
     at: u64,
     room: u64,

@@ -1,14 +1,10 @@
-//! What is done about damage in a file, and what it cost: points that are lost are counted where
-//! they are lost, and told with the byte from which on.
+//! What is done about damage in a LAS file, and what it cost.
 
 use super::file::InputFile;
-use crate::error::shown;
-use crate::report::{Grouped, LostPoints};
+use crate::io::damage::{advised, lost};
+use crate::report::LostPoints;
 use crate::stage::OnError;
 use crate::{Error, ErrorKind, Result};
-
-/// Losses of one file that are told one by one.
-const TOLD: usize = 3;
 
 /// What is done about the damage of one file, and what it came to so far.
 #[derive(Debug, Clone, Default)]
@@ -47,47 +43,7 @@ impl Mending {
         if !self.mends(&error) {
             return Err(advised(error));
         }
-        self.lost.push(lost(file, byte, points, error.message()));
+        self.lost.push(lost(file.path(), byte, points, error.message()));
         Ok(())
     }
-}
-
-/// What helps besides another copy.
-const ADVICE: &str = "`read.on_error = \"salvage\"` reads what can be read, and says what is lost";
-
-/// `error`, with what helps besides.
-pub fn advised(error: Error) -> Error {
-    if error.kind() != ErrorKind::Data {
-        return error;
-    }
-    let help = match error.remedy() {
-        Some(help) => format!("{help}; {ADVICE}"),
-        None => ADVICE.to_owned(),
-    };
-    error.help(help)
-}
-
-/// Points that are lost in a file.
-pub fn lost(file: &InputFile, byte: u64, points: u64, why: &str) -> LostPoints {
-    let path = file.path().to_string_lossy().into_owned();
-    LostPoints { path, byte, points, why: why.to_owned() }
-}
-
-/// What is told of the losses of one file.
-pub fn told(lost: &[LostPoints]) -> Vec<String> {
-    let Some(first) = lost.first() else { return Vec::new() };
-    let path = shown(std::path::Path::new(&first.path)).to_string();
-    let one = |lost: &LostPoints| {
-        let LostPoints { byte, points, why, .. } = lost;
-        format!("{path}: at byte {byte}: {} points are lost: {why}", Grouped(*points))
-    };
-    let mut all: Vec<String> = lost.iter().take(TOLD).map(one).collect();
-    if lost.len() > 1 {
-        let points = lost.iter().map(|lost| lost.points).sum();
-        let (points, places) = (Grouped(points), lost.len());
-        all.push(format!(
-            "{path}: {points} points are lost in {places} places; the report has all"
-        ));
-    }
-    all
 }

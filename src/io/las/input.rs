@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::chunks;
 use super::chunks::Chunks;
 use super::crs;
-use super::damage::{Mending, advised};
+use super::damage::Mending;
 use super::described::Described;
 use super::extra::Descriptor;
 use super::extras::absent;
@@ -14,6 +14,7 @@ use super::fields::encoding;
 use super::file::InputFile;
 use super::format;
 use super::header::Header;
+use super::held::held;
 use super::laz::{Compression, LASZIP};
 use super::noted::NOTE;
 use super::records::{read_evlrs, read_vlrs};
@@ -21,6 +22,7 @@ use super::system::CrsRecords;
 use super::vlr::{Evlr, VLR_HEAD, Vlr};
 use super::waveforms::Waveforms;
 use crate::error::shown;
+use crate::io::damage::advised;
 use crate::io::origin::Origin;
 use crate::point::{Dimension, Schema, Value};
 use crate::report::{Grouped, LostPoints};
@@ -273,11 +275,20 @@ fn storage(
     let at = (usize::from(header.header_size) + before + VLR_HEAD) as u64;
     let (format, stride) = (header.format(), header.point_data_record_length);
     let compression = Compression::read(file, &vlrs[record], at, format, stride)?;
-    if let Some(bytes) = chunks::uncounted(file, header, evlrs_start, &compression)? {
-        return Err(uncounted(file, bytes));
+    let counted = header.points();
+    let held = match mending.on_error {
+        OnError::Salvage => held(file, header, &compression)?.filter(|held| *held > counted),
+        _ => None,
+    };
+    let found = chunks::uncounted(file, header, evlrs_start, &compression)?;
+    match (held, found) {
+        (Some(held), _) => mending.warnings.push(behind_counted(file, held - counted, counted)),
+        (None, Some(bytes)) => return Err(advised(uncounted(file, bytes))),
+        (None, None) => {}
     }
+    let points = held.unwrap_or(counted);
     let end = behind_points(file, header, evlrs_start, u64::from(header.offset_to_point_data));
-    let mut chunks = Chunks::read(file, header, &compression, end, mending)?;
+    let mut chunks = Chunks::read(file, (header, points), &compression, end, mending)?;
     check_last(file, &compression, &mut chunks, mending)?;
     Ok(Storage::Laz(compression, chunks))
 }
@@ -312,12 +323,7 @@ fn plain(
     let behind = behind_points(file, header, evlrs_start, end) - end;
     if mending.on_error == OnError::Salvage && behind >= each {
         let more = behind / each;
-        mending.warnings.push(format!(
-            "{}: {} points behind the {} that the header counts are read, too",
-            shown(file.path()),
-            Grouped(more),
-            Grouped(points)
-        ));
+        mending.warnings.push(behind_counted(file, more, points));
         return Ok(points + more);
     }
     if points == 0 && behind >= each {
@@ -332,6 +338,16 @@ fn plain(
         ));
     }
     Ok(points)
+}
+
+/// What is said of points that the header does not count and that are read.
+fn behind_counted(file: &InputFile, more: u64, counted: u64) -> String {
+    format!(
+        "{}: {} points behind the {} that the header counts are read, too",
+        shown(file.path()),
+        Grouped(more),
+        Grouped(counted)
+    )
 }
 
 /// Where the next thing behind the points begins, which end at byte `end` or later, or the file

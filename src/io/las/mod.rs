@@ -23,6 +23,7 @@ pub(crate) mod format;
 mod found;
 mod guard;
 mod header;
+mod held;
 pub(crate) mod holding;
 mod input;
 mod las15;

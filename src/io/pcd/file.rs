@@ -10,12 +10,14 @@ use super::lzf::LzfMark;
 use super::names::RECORDS;
 use super::packed::Packed;
 use crate::error::shown;
+use crate::io::damage::Losses;
 use crate::io::origin::Origin;
 use crate::io::rows::names::heading;
 use crate::io::rows::schema::{ALPHA, PACKED};
 use crate::point::names::{BLUE, COLUMN, GREEN, RED, ROW, XYZ};
 use crate::point::{Dimension, Endian, Scalar, Schema};
 use crate::report::Grouped;
+use crate::stage::OnError;
 use crate::{Error, Result};
 
 /// Points of one part of a binary file.
@@ -34,11 +36,13 @@ pub(super) struct PcdFile {
     pub rounded: AtomicU64,
     /// Where packed values may be read from, once somebody has looked.
     pub marks: Mutex<Option<Arc<Vec<LzfMark>>>>,
+    /// What is lost of it.
+    pub losses: Losses,
 }
 
 impl PcdFile {
     /// Reads the header, and holds it against the file's length.
-    pub fn open(path: &Path) -> Result<PcdFile> {
+    pub fn open(path: &Path, on_error: OnError) -> Result<PcdFile> {
         let (file, origin) = Origin::open(path)?;
         let length = origin.length();
         let header = PcdHeader::read(origin.reopen()?, path, length)?;
@@ -54,6 +58,7 @@ impl PcdFile {
             empty: Vec::new(),
             rounded: AtomicU64::new(0),
             marks: Mutex::new(None),
+            losses: Losses::new(on_error),
         };
         let names = opened.names();
         let lacks = |axis: &&str| !names.iter().any(|name| name == axis);
@@ -81,6 +86,16 @@ impl PcdFile {
     /// Cells without a point that were met so far.
     pub fn empty(&self) -> u64 {
         self.empty.iter().map(|of_part| of_part.load(Ordering::Relaxed)).sum()
+    }
+
+    /// The row and the column of a cell of a grid, as records have them.
+    pub fn place(&self, cell: u64) -> [u8; 8] {
+        let width = self.header.width.max(1);
+        let [row, column] = [(cell / width) as u32, (cell % width) as u32].map(u32::to_le_bytes);
+        let mut bytes = [0; 8];
+        bytes[..4].copy_from_slice(&row);
+        bytes[4..].copy_from_slice(&column);
+        bytes
     }
 
     /// True if its points are a grid.
@@ -153,8 +168,9 @@ impl PcdFile {
         (schema, numbers)
     }
 
-    /// Refuses a count of points that the file is too short for.
-    fn bound(&self) -> Result<()> {
+    /// Refuses a count of points that the file is too short for, or goes on with those that there
+    /// are.
+    fn bound(&mut self) -> Result<()> {
         let header = &self.header;
         let room = self.origin.length().saturating_sub(header.body);
         let numbers = header.fields.iter().map(|field| field.count as u64).sum::<u64>();
@@ -166,12 +182,19 @@ impl PcdFile {
         if header.points <= holds {
             return Ok(());
         }
-        let (points, holds) = (Grouped(header.points), Grouped(holds));
-        let told =
-            format!("the header claims {points} points, the file ends after {holds} at most");
-        Err(Error::data(&self.path, told)
-            .at_byte(self.origin.length())
-            .help("the file is cut short, or its header is wrong"))
+        let lost = header.points - holds;
+        let told = format!(
+            "the header claims {} points, the file ends after {} at most",
+            Grouped(header.points),
+            Grouped(holds)
+        );
+        let end = self.origin.length();
+        let error = Error::data(&self.path, told)
+            .at_byte(end)
+            .help("the file is cut short, or its header is wrong");
+        self.losses.lose(&self.path, end, lost, error)?;
+        self.header.points = holds;
+        Ok(())
     }
 
     /// What was found while it was read.

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::file::PcdFile;
 use super::lzf::Unpacker;
+use crate::io::damage::PartLosses;
 use crate::io::rows::fields::{Delimiter, Fields};
 use crate::io::rows::lines::{Lines, shown};
 use crate::io::rows::number;
@@ -45,6 +46,8 @@ pub(super) struct PcdPart<'a> {
     pub source: u32,
     /// Where it says how many cells have no point, and how many had none so far.
     pub empty: (&'a AtomicU64, u64),
+    /// Its number in the file, and what is lost of it.
+    pub losses: (usize, PartLosses),
     /// The points of a grid before they get their rows and columns; or the values of one field.
     pub buffer: Vec<u8>,
 }
@@ -54,7 +57,7 @@ impl Part for PcdPart<'_> {
         batch.source = self.source;
         batch.clear();
         let outcome = loop {
-            let outcome = self.fill(batch);
+            let outcome = self.fill(batch).or_else(|error| self.give_up(error, batch));
             // Cells without a point may have been all.
             if outcome.is_err() || !batch.is_empty() || self.left == 0 {
                 break outcome;
@@ -69,6 +72,9 @@ impl PcdPart<'_> {
         let points = self.left.min(batch.capacity() as u64) as usize;
         let (own, stride) = (self.own, self.schema.stride);
         let records = batch.refill(points);
+        if matches!(self.points, Points::Ascii(_)) {
+            return self.lines(batch, points);
+        }
         match &mut self.points {
             Points::Binary(file, at) if own == stride => read_at(self.file, file, at, records)?,
             Points::Binary(file, at) => {
@@ -80,12 +86,7 @@ impl PcdPart<'_> {
                     record[..own].copy_from_slice(point);
                 }
             }
-            Points::Ascii(ascii) => {
-                for (n, record) in records.chunks_exact_mut(stride).enumerate() {
-                    ascii.point(self.file, self.cell + n as u64, record)?;
-                }
-                self.file.rounded.fetch_max(ascii.rounded, Ordering::Relaxed);
-            }
+            Points::Ascii(_) => {}
             Points::Packed(fields) => {
                 let mut place = 0;
                 for (unpacker, field) in fields.iter_mut().zip(&self.file.header.fields) {
@@ -101,16 +102,55 @@ impl PcdPart<'_> {
             }
         }
         if self.file.is_grid() {
-            let width = self.file.header.width;
             for (cell, record) in (self.cell..).zip(records.chunks_exact_mut(stride)) {
-                let place = [(cell / width) as u32, (cell % width) as u32];
-                let bytes = place.map(u32::to_le_bytes);
-                record[own..own + 8].copy_from_slice(bytes.as_flattened());
+                record[own..own + 8].copy_from_slice(&self.file.place(cell));
             }
         }
         self.cell += points as u64;
         self.left -= points as u64;
         self.leave_out(batch);
+        Ok(())
+    }
+
+    /// Reads points of lines; those that are wrong are passed over, if that is wanted.
+    fn lines(&mut self, batch: &mut PointBatch, points: usize) -> Result<()> {
+        let (own, stride, mut read) = (self.own, self.schema.stride, 0);
+        while read < points && self.left > 0 {
+            let Points::Ascii(ascii) = &mut self.points else { break };
+            let (at, before) = (ascii.lines.at(), ascii.lines.number());
+            let record = &mut batch.records_mut()[read * stride..(read + 1) * stride];
+            let mut gone = 1;
+            match ascii.point(self.file, self.cell, record) {
+                Ok(()) => {
+                    if self.file.is_grid() {
+                        record[own..own + 8].copy_from_slice(&self.file.place(self.cell));
+                    }
+                    read += 1;
+                }
+                Err(error) => {
+                    if ascii.lines.number() == before && !ascii.lines.pass_over()? {
+                        gone = self.left;
+                    }
+                    let byte = error.byte().unwrap_or(at);
+                    self.losses.1.lose(&self.file.path, byte, gone, error)?;
+                }
+            }
+            self.file.rounded.fetch_max(ascii.rounded, Ordering::Relaxed);
+            (self.cell, self.left) = (self.cell + gone, self.left - gone);
+        }
+        self.file.losses.enter(self.losses.0, &self.losses.1);
+        batch.truncate(read);
+        self.leave_out(batch);
+        Ok(())
+    }
+
+    /// Goes on without the points that are left of the part, if that is wanted.
+    fn give_up(&mut self, error: Error, batch: &mut PointBatch) -> Result<()> {
+        let byte = error.byte().unwrap_or(self.file.header.body);
+        self.losses.1.lose(&self.file.path, byte, self.left, error)?;
+        self.file.losses.enter(self.losses.0, &self.losses.1);
+        self.left = 0;
+        batch.clear();
         Ok(())
     }
 

@@ -38,6 +38,10 @@ impl Format for PcdFormat {
         ["# .PCD", "VERSION .", "VERSION 0.", "FIELDS ", "COLUMNS "].into_iter().any(begins)
     }
 
+    fn read_keys(&self) -> &'static [&'static str] {
+        &["on_error"]
+    }
+
     fn open(&self, files: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn Source>> {
         source::open(files, keys)
     }

@@ -8,12 +8,14 @@ use super::header::{LONGEST_LINE, PcdData, PcdField};
 use super::lzf::Unpacker;
 use super::part::{AsciiPoints, PcdPart, Points};
 use crate::error::shown;
+use crate::io::damage::told;
 use crate::io::rows::comments::Said;
 use crate::io::rows::lines::Lines;
 use crate::io::rows::parts::PartEnds;
 use crate::io::systems;
 use crate::point::names::XYZ;
 use crate::point::{Metadata, Scalar, Schema};
+use crate::report::LostPoints;
 use crate::stage::{Input, Part, ReadKeys, Source};
 use crate::{Error, Result};
 
@@ -34,7 +36,8 @@ pub(super) struct PcdNative {
 /// A file that is no PCD, has no `x`, `y` and `z`, or is too short for the count that it claims;
 /// files whose fields differ.
 pub(super) fn open(paths: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn Source>> {
-    let files = paths.iter().map(|path| PcdFile::open(path)).collect::<Result<Vec<_>>>()?;
+    let files = paths.iter().map(|path| PcdFile::open(path, keys.on_error));
+    let files = files.collect::<Result<Vec<_>>>()?;
     let Some(first) = files.first() else {
         return Err(Error::pipeline("no PCD file to read"));
     };
@@ -145,7 +148,10 @@ impl Source for PcdSource {
     }
 
     fn inputs(&self) -> Vec<Input> {
-        let found = |file: &PcdFile| file.header.points.saturating_sub(file.empty());
+        let found = |file: &PcdFile| {
+            let left_out = file.empty() + file.losses.while_read();
+            file.header.points.saturating_sub(left_out)
+        };
         self.files.iter().map(|file| Input::new(&file.path, found(file))).collect()
     }
 
@@ -181,7 +187,8 @@ impl Source for PcdSource {
     fn first_record(&self, index: usize) -> Option<u64> {
         // Cells without a point are known once they are read.
         let is_whole = |axis: &str| self.schema.find(axis).is_some_and(|d| !d.scalar.is_float());
-        if index > 0 && !XYZ.into_iter().all(is_whole) {
+        let mends = self.files.iter().any(|file| file.losses.mends());
+        if index > 0 && (mends || !XYZ.into_iter().all(is_whole)) {
             return None;
         }
         let (number, file, within) = self.place(index)?;
@@ -210,10 +217,27 @@ impl Source for PcdSource {
         let (source, buffer) = (number as u32, Vec::new());
         let schema = &*self.schema;
         let empty = (&file.empty[within], 0);
-        Ok(Box::new(PcdPart { file, points, schema, own, cell, left, source, empty, buffer }))
+        let losses = (within, file.losses.part());
+        Ok(Box::new(PcdPart {
+            file,
+            points,
+            schema,
+            own,
+            cell,
+            left,
+            source,
+            empty,
+            losses,
+            buffer,
+        }))
     }
 
     fn warnings(&self) -> Vec<String> {
-        self.files.iter().flat_map(PcdFile::warnings).collect()
+        let lost = self.files.iter().flat_map(|file| told(&file.losses.all()));
+        self.files.iter().flat_map(PcdFile::warnings).chain(lost).collect()
+    }
+
+    fn lost(&self) -> Vec<LostPoints> {
+        self.files.iter().flat_map(|file| file.losses.all()).collect()
     }
 }

@@ -6,6 +6,7 @@ use std::sync::atomic::Ordering;
 
 use super::file::PlyFile;
 use super::header::{Property, PropertyKind};
+use crate::io::damage::PartLosses;
 use crate::io::rows::fields::{Delimiter, Fields};
 use crate::io::rows::lines::{Lines, shown};
 use crate::io::rows::number;
@@ -34,6 +35,7 @@ pub(super) struct AsciiPart<'a> {
     source: u32,
     /// Numbers that have more digits than the `float` that holds them.
     rounded: u64,
+    losses: PartLosses,
 }
 
 impl<'a> AsciiPart<'a> {
@@ -67,6 +69,7 @@ impl<'a> AsciiPart<'a> {
             left: file.points,
             source,
             rounded: 0,
+            losses: file.losses.part(),
         }
     }
 
@@ -86,11 +89,41 @@ impl<'a> AsciiPart<'a> {
             .help("the file is cut short, or its header is wrong")
     }
 
-    fn vertex(&mut self, record: &mut [u8]) -> Result<()> {
-        let Some((start, end)) = self.lines.next()? else {
-            let read = self.points - self.left;
-            return Err(self.short(&format!("after {read} of {} vertices", self.points)));
-        };
+    /// Reads the vertices of lines until there is one, or no line is left. Those that are wrong are
+    /// passed over, if that is wanted.
+    fn vertex(&mut self, record: &mut [u8]) -> Result<bool> {
+        while self.left > 0 {
+            let (at, before) = (self.lines.at(), self.lines.number());
+            let error = match self.lines.next() {
+                Ok(Some(line)) => match self.numbers(line, record) {
+                    Ok(()) => {
+                        self.left -= 1;
+                        return Ok(true);
+                    }
+                    Err(error) => error,
+                },
+                Ok(None) => {
+                    let read = self.points - self.left;
+                    let error = self.short(&format!("after {read} of {} vertices", self.points));
+                    self.losses.lose(self.path, self.lines.length(), self.left, error)?;
+                    self.left = 0;
+                    break;
+                }
+                Err(error) => error,
+            };
+            let byte = error.byte().unwrap_or(at);
+            self.losses.lose(self.path, byte, 1, error)?;
+            self.left -= 1;
+            // One that is too long was not read.
+            if self.lines.number() == before {
+                self.lines.pass_over()?;
+            }
+        }
+        Ok(false)
+    }
+
+    /// Reads the numbers of a line into a record.
+    fn numbers(&mut self, (start, end): (usize, usize), record: &mut [u8]) -> Result<()> {
         let line = self.lines.text(start, end);
         let fail = |place: usize, message: String| {
             Error::data(self.path, format!("line {}: {message}", self.lines.number()))
@@ -175,12 +208,17 @@ impl AsciiPart<'_> {
         batch.source = self.source;
         batch.clear();
         self.skip()?;
-        let points = self.left.min(batch.capacity() as u64) as usize;
-        let stride = self.stride;
+        let mut points = self.left.min(batch.capacity() as u64) as usize;
+        let (stride, mut read) = (self.stride, 0);
         for record in batch.refill(points).chunks_exact_mut(stride) {
-            self.vertex(record)?;
-            self.left -= 1;
+            if !self.vertex(record)? {
+                break;
+            }
+            read += 1;
         }
+        batch.truncate(read);
+        points = read;
+        self.file.losses.enter(0, &self.losses);
         // The file may be looked at before it is read.
         self.file.rounded.fetch_max(self.rounded, Ordering::Relaxed);
         // A line behind the last vertex may be too long to be read: it is there all the same.

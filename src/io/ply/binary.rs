@@ -3,7 +3,9 @@
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 
+use super::file::PlyFile;
 use super::header::{Property, PropertyKind};
+use crate::io::damage::PartLosses;
 use crate::io::origin::Origin;
 use crate::point::{Dimension, Endian, PointBatch, Scalar, Value};
 use crate::stage::Part;
@@ -46,7 +48,9 @@ const WINDOW: usize = 1 << 16;
 /// those before.
 pub(super) struct ListedPart<'a> {
     file: File,
+    ply: &'a PlyFile,
     origin: &'a Origin,
+    losses: PartLosses,
     properties: &'a [Property],
     endian: Endian,
     window: Vec<u8>,
@@ -63,14 +67,27 @@ impl<'a> ListedPart<'a> {
 
     /// The vertices from byte `at` on.
     pub fn new(
-        (file, origin): (File, &'a Origin),
+        (file, ply): (File, &'a PlyFile),
         (properties, endian): (&'a [Property], Endian),
         at: u64,
         left: u64,
         source: u32,
     ) -> Self {
-        let window = Vec::new();
-        ListedPart { file, origin, properties, endian, window, next: 0, from: at, left, source }
+        let (window, origin, losses) = (Vec::new(), &ply.origin, ply.losses.part());
+        let (next, from) = (0, at);
+        ListedPart {
+            file,
+            ply,
+            origin,
+            losses,
+            properties,
+            endian,
+            window,
+            next,
+            from,
+            left,
+            source,
+        }
     }
 
     fn short(&self) -> Error {
@@ -138,15 +155,38 @@ impl<'a> ListedPart<'a> {
     }
 }
 
+impl ListedPart<'_> {
+    /// Goes on without the vertices that are left, if that is wanted: where they begin is not
+    /// known.
+    fn give_up(&mut self, error: Error) -> Result<()> {
+        let at = error.byte().unwrap_or(self.from);
+        self.losses.lose(self.origin.path(), at, self.left, error)?;
+        self.ply.losses.enter(0, &self.losses);
+        self.left = 0;
+        Ok(())
+    }
+}
+
 impl Part for ListedPart<'_> {
     fn read(&mut self, batch: &mut PointBatch) -> Result<()> {
         batch.source = self.source;
         batch.clear();
         let points = self.left.min(batch.capacity() as u64) as usize;
         let stride = batch.schema().stride;
-        let records = batch.refill(points).chunks_exact_mut(stride);
-        let outcome = records.into_iter().try_for_each(|record| self.vertex(record));
-        self.left -= points as u64;
-        self.origin.vouch(outcome, points == 0)
+        let mut read = 0;
+        let mut outcome = Ok(());
+        for record in batch.refill(points).chunks_exact_mut(stride) {
+            outcome = self.vertex(record);
+            if outcome.is_err() {
+                break;
+            }
+            read += 1;
+        }
+        self.left -= read as u64;
+        if let Err(error) = outcome {
+            outcome = self.give_up(error);
+            batch.truncate(read);
+        }
+        self.origin.vouch(outcome, read == 0)
     }
 }

@@ -7,10 +7,12 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use super::header::{Element, PlyHeader, Property, PropertyKind};
 use super::walk;
+use crate::io::damage::Losses;
 use crate::io::origin::Origin;
 use crate::io::rows::Encoding;
 use crate::io::rows::lines::shown;
 use crate::io::rows::names::dimension_of;
+use crate::stage::OnError;
 use crate::{Error, Result};
 
 /// One file, its header read.
@@ -33,11 +35,15 @@ pub(super) struct PlyFile {
     /// True for a text whose last vertex ends where the file does: nobody knows whether its last
     /// number has all its digits.
     pub ends_in_a_number: bool,
+    /// What is lost of it.
+    pub losses: Losses,
+    /// True if it ends before its vertices do.
+    pub is_cut: bool,
 }
 
 impl PlyFile {
     /// Reads the header, and what stands before the vertices of a binary file.
-    pub fn open(path: &Path) -> Result<PlyFile> {
+    pub fn open(path: &Path, on_error: OnError) -> Result<PlyFile> {
         let (file, origin) = Origin::open(path)?;
         let length = origin.length();
         let header = PlyHeader::read(&file, path, length)?;
@@ -69,10 +75,12 @@ impl PlyFile {
             more_lines: AtomicBool::new(false),
             rounded: AtomicU64::new(0),
             ends_in_a_number: false,
+            losses: Losses::new(on_error),
+            is_cut: false,
             header,
         };
-        file.ends_in_a_number = ends_open && file.points > 0 && file.ends_with_vertices();
         file.bound()?;
+        file.ends_in_a_number = ends_open && file.points > 0 && file.ends_with_vertices();
         Ok(file)
     }
 
@@ -124,8 +132,9 @@ impl PlyFile {
         })
     }
 
-    /// Refuses a count of vertices that the file is too short for.
-    fn bound(&self) -> Result<()> {
+    /// Refuses a count of vertices that the file is too short for, or goes on with those that there
+    /// are.
+    fn bound(&mut self) -> Result<()> {
         let room = self.length.saturating_sub(self.body);
         let holds = match self.header.elements[self.vertex].size() {
             Some(size) if self.header.encoding != Encoding::Ascii => room / size.max(1),
@@ -142,15 +151,16 @@ impl PlyFile {
         if self.points <= holds {
             return Ok(());
         }
-        Err(Error::data(
-            &self.path,
-            format!(
-                "the header claims {} vertices, the file ends after {holds} at most",
-                self.points
-            ),
-        )
-        .at_byte(self.length)
-        .help("the file is cut short, or its header is wrong"))
+        let told = format!(
+            "the header claims {} vertices, the file ends after {holds} at most",
+            self.points
+        );
+        let error = Error::data(&self.path, told)
+            .at_byte(self.length)
+            .help("the file is cut short, or its header is wrong");
+        self.losses.lose(&self.path, self.length, self.points - holds, error)?;
+        (self.points, self.is_cut) = (holds, true);
+        Ok(())
     }
 }
 

@@ -42,6 +42,10 @@ impl Format for PlyFormat {
         first.starts_with(b"ply")
     }
 
+    fn read_keys(&self) -> &'static [&'static str] {
+        &["on_error"]
+    }
+
     fn open(&self, files: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn Source>> {
         source::open_with(files, keys)
     }

@@ -8,6 +8,7 @@ use super::ascii::AsciiPart;
 use super::binary::{BinaryPart, ListedPart};
 use super::file::PlyFile;
 use super::header::Element;
+use crate::io::damage::told;
 use crate::io::origin::Origin;
 use crate::io::rows::Encoding;
 use crate::io::rows::lines::shown;
@@ -15,6 +16,7 @@ use crate::io::rows::parts::PartEnds;
 use crate::io::systems;
 use crate::io::united::ToOneForm;
 use crate::point::{Metadata, Schema};
+use crate::report::LostPoints;
 use crate::stage::{Contradiction, Input, Part, ReadKeys, Source};
 use crate::{Error, Result};
 
@@ -76,7 +78,8 @@ struct PlySource {
 
 impl PlySource {
     pub fn open(paths: &[PathBuf], keys: &ReadKeys) -> Result<PlySource> {
-        let files = paths.iter().map(|path| PlyFile::open(path)).collect::<Result<Vec<_>>>()?;
+        let files = paths.iter().map(|path| PlyFile::open(path, keys.on_error));
+        let files = files.collect::<Result<Vec<_>>>()?;
         let Some(first) = files.first() else {
             return Err(Error::pipeline("no PLY file to read"));
         };
@@ -101,8 +104,8 @@ impl PlySource {
             usize::try_from(own).unwrap_or(usize::MAX)
         };
         let ends = PartEnds::of(files.iter().map(parts));
-        let told = |file| [listed(file), dropped(file), cut(file)].into_iter().flatten();
-        let warnings = files.iter().flat_map(told);
+        let odd = |file| [listed(file), dropped(file), cut(file)].into_iter().flatten();
+        let warnings = files.iter().flat_map(odd);
         let warnings = warnings.collect();
         Ok(PlySource { schema, own, forms, metadata, crs, files, ends, warnings })
     }
@@ -122,7 +125,7 @@ impl PlySource {
         if !file.lists().is_empty() {
             let properties = (file.properties(), schema.endian);
             let (at, left) = (file.body, file.points);
-            let part = ListedPart::new((handle, &file.origin), properties, at, left, source);
+            let part = ListedPart::new((handle, file), properties, at, left, source);
             return Ok(Box::new(part));
         }
         let start = within as u64 * PART_POINTS;
@@ -179,7 +182,8 @@ fn rest(files: &[PlyFile]) -> Option<Rest> {
     let elements = &file.header.elements;
     let size = elements[file.vertex].size()?;
     let (before, after) = (&elements[..file.vertex], &elements[file.vertex + 1..]);
-    if file.header.encoding == Encoding::Ascii || (before.is_empty() && after.is_empty()) {
+    let is_whole = !file.is_cut && file.header.encoding != Encoding::Ascii;
+    if !is_whole || (before.is_empty() && after.is_empty()) {
         return None;
     }
     let end = file.body + file.points * size; // within the file: bounded on opening
@@ -240,7 +244,7 @@ impl Source for PlySource {
     }
 
     fn inputs(&self) -> Vec<Input> {
-        let input = |f: &PlyFile| Input::new(&f.path, f.points);
+        let input = |f: &PlyFile| Input::new(&f.path, f.points - f.losses.while_read());
         self.files.iter().map(input).collect()
     }
 
@@ -273,6 +277,10 @@ impl Source for PlySource {
     }
 
     fn first_record(&self, index: usize) -> Option<u64> {
+        // What is left out of a file is known once it is read.
+        if index > 0 && self.files.iter().any(|file| file.losses.mends()) {
+            return None;
+        }
         let (number, within) = self.ends.place(index);
         let before = self.files.get(..number)?.iter().map(|file| file.points).sum::<u64>();
         Some(before + within as u64 * PART_POINTS)
@@ -289,7 +297,12 @@ impl Source for PlySource {
 
     fn warnings(&self) -> Vec<String> {
         let found = self.files.iter().filter_map(PlyFile::rounded);
-        self.warnings.iter().cloned().chain(found).collect()
+        let lost = self.files.iter().flat_map(|file| told(&file.losses.all()));
+        self.warnings.iter().cloned().chain(found).chain(lost).collect()
+    }
+
+    fn lost(&self) -> Vec<LostPoints> {
+        self.files.iter().flat_map(|file| file.losses.all()).collect()
     }
 
     fn contradictions(&self) -> Vec<Contradiction> {

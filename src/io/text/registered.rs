@@ -96,7 +96,7 @@ impl Format for TextFormat {
     fn read_keys(&self) -> &'static [&'static str] {
         match self.habit.kind {
             TextKind::Ptx => &[],
-            _ => &["columns"],
+            _ => &["columns", "on_error"],
         }
     }
 

@@ -8,8 +8,9 @@ use super::columns::{dimensions, guessed, scalar};
 use super::head::{TextHead, without_mark};
 use super::names::{LONGEST_LINE, RECORDS};
 use super::ptx::{self, PtxScan, PtxText};
-use super::survey::{CORRECT, TextStretch, TextSurvey, few, no_number, survey};
+use super::survey::{CORRECT, TextStretch, TextSurvey, belied, few, next, no_number, survey};
 use crate::error::shown;
+use crate::io::damage::{Losses, PartLosses, told};
 use crate::io::origin::Origin;
 use crate::io::rows::facts::ColumnFacts;
 use crate::io::rows::fields::{Delimiter, Fields, is_comment, is_count};
@@ -20,8 +21,9 @@ use crate::io::rows::schema::placed;
 use crate::io::systems;
 use crate::point::names::{BLUE, COLUMN, GREEN, INTENSITY, NIR, POINT_SOURCE_ID, RED, ROW, XYZ};
 use crate::point::{Dimension, Endian, Layout, Metadata, PointBatch, Scalar, Schema};
-use crate::stage::{Contradiction, Input, Part, ReadKeys, Source};
-use crate::{Error, Result};
+use crate::report::LostPoints;
+use crate::stage::{Contradiction, Input, OnError, Part, ReadKeys, Source};
+use crate::{Error, ErrorKind, Result};
 
 /// Kinds of texts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -94,8 +96,11 @@ impl TextFile {
             None => n >= 3,
             Some(named) => named[n].as_deref().is_some_and(|name| !XYZ.contains(&name)),
         };
-        let looks = (0..head.columns).map(looks).collect();
-        let found = survey(origin.reopen()?, path, length, &head, looks)?;
+        // Lines that are wrong are to be known before they are read.
+        let all = keys.on_error != OnError::Fail;
+        let looks = (0..head.columns).map(|n| all || looks(n)).collect();
+        let lost = Losses::new(keys.on_error).part();
+        let found = survey(origin.reopen()?, path, length, &head, looks, lost)?;
         let mut warnings = Vec::new();
         let columns = match named {
             Some(named) => named,
@@ -256,11 +261,17 @@ impl Source for TextSource {
             cell: stretch.cells,
         });
         let (left, source) = (stretch.points, number as u32);
-        Ok(Box::new(TextPart { file, lines, fields, schema: &self.schema, grid, left, source }))
+        let (schema, lost) = (&*self.schema, file.found.lost.again());
+        Ok(Box::new(TextPart { file, lines, fields, schema, grid, left, source, lost }))
     }
 
     fn warnings(&self) -> Vec<String> {
-        self.files.iter().flat_map(|file| file.warnings.clone()).collect()
+        let lost = |file: &TextFile| told(file.found.lost.list());
+        self.files.iter().flat_map(|file| file.warnings.iter().cloned().chain(lost(file))).collect()
+    }
+
+    fn lost(&self) -> Vec<LostPoints> {
+        self.files.iter().flat_map(|file| file.found.lost.list().to_vec()).collect()
     }
 
     fn contradictions(&self) -> Vec<Contradiction> {
@@ -268,19 +279,6 @@ impl Source for TextSource {
         let of = |file: &TextFile| Some(Contradiction::new(&file.path, 0, file.belied.clone()?));
         self.files.iter().filter_map(of).collect()
     }
-}
-
-/// What a text says of the number of its points, if it has more; fewer are an error.
-fn belied(path: &Path, length: u64, found: &TextSurvey) -> Result<Option<String>> {
-    let (points, claimed) = (found.points, found.claimed.unwrap_or(found.points));
-    if claimed > points {
-        let told = format!("it says that it has {claimed} points, and ends after {points}");
-        return Err(Error::data(path, told)
-            .at_byte(length)
-            .help("the file is cut short, or the number is wrong: correct it"));
-    }
-    let told = || format!("it says that it has {claimed} points, and has {points}");
-    Ok((claimed < points).then(told))
 }
 
 /// Where a part of PTX is in its scan.
@@ -300,6 +298,8 @@ struct TextPart<'a> {
     grid: Option<PtxGrid>,
     left: u64,
     source: u32,
+    /// What is wrong is passed over, or not.
+    lost: PartLosses,
 }
 
 impl Part for TextPart<'_> {
@@ -325,7 +325,7 @@ impl TextPart<'_> {
     /// Reads the next point.
     fn point(&mut self, record: &mut [u8]) -> Result<()> {
         loop {
-            let Some((start, end)) = self.lines.next()? else {
+            let Some((start, end)) = next(&mut self.lines, &self.file.path, &mut self.lost)? else {
                 let told = "the file has fewer points than when it was looked through";
                 return Err(Error::data(&self.file.path, told).at_byte(self.lines.length()));
             };
@@ -335,7 +335,11 @@ impl TextPart<'_> {
                 if is_comment(line).is_some() || is_count(line) {
                     continue;
                 }
-                return self.numbers(line, at, record);
+                // What is wrong was found when the file was looked through.
+                match self.numbers(line, at, record) {
+                    Err(error) if self.lost.mends() && error.kind() == ErrorKind::Data => continue,
+                    read => return read,
+                }
             };
             let cell = grid.cell;
             grid.cell += 1;

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::head::TextHead;
 use super::names::LONGEST_LINE;
+use crate::io::damage::PartLosses;
 use crate::io::rows::facts::ColumnFacts;
 use crate::io::rows::fields::{Delimiter, Fields, is_comment, is_count};
 use crate::io::rows::lines::{Lines, shown};
@@ -29,7 +30,7 @@ pub(super) struct TextStretch {
 }
 
 /// What a survey finds.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub(super) struct TextSurvey {
     /// Of every column.
     pub facts: Vec<ColumnFacts>,
@@ -38,6 +39,8 @@ pub(super) struct TextSurvey {
     pub points: u64,
     /// How many points lines with one number say that there are.
     pub claimed: Option<u64>,
+    /// Lines that are wrong, and passed over.
+    pub lost: PartLosses,
 }
 
 /// Collects the facts and stretches of a text.
@@ -111,7 +114,7 @@ impl<'a> Surveyor<'a> {
         self.end(end);
         self.stretches.retain(|stretch| stretch.points > 0);
         let Surveyor { facts, stretches, points, .. } = self;
-        TextSurvey { facts, stretches, points, claimed }
+        TextSurvey { facts, stretches, points, claimed, lost: PartLosses::default() }
     }
 }
 
@@ -132,22 +135,54 @@ pub(super) fn no_number(path: &Path, line: u64, column: usize, field: &[u8]) -> 
     Error::data(path, told).help(CORRECT)
 }
 
-/// Looks through a text that begins with `head`; `looks` says at which of its columns.
+/// What a text says of the number of its points, if it has more; fewer are an error.
+pub(super) fn belied(path: &Path, length: u64, found: &TextSurvey) -> Result<Option<String>> {
+    let (points, claimed) = (found.points, found.claimed.unwrap_or(found.points));
+    if claimed > points + found.lost.points() {
+        let told = format!("it says that it has {claimed} points, and ends after {points}");
+        return Err(Error::data(path, told)
+            .at_byte(length)
+            .help("the file is cut short, or the number is wrong: correct it"));
+    }
+    let told = || format!("it says that it has {claimed} points, and has {points}");
+    Ok((claimed < points).then(told))
+}
+
+/// The next line with something on it; one that is too long is passed over and lost.
+pub(super) fn next(
+    lines: &mut Lines<'_>,
+    path: &Path,
+    lost: &mut PartLosses,
+) -> Result<Option<(usize, usize)>> {
+    loop {
+        let at = lines.at();
+        match lines.next() {
+            Err(error) => lost.lose(path, at, 1, error)?,
+            line => return line,
+        }
+        lines.pass_over()?;
+    }
+}
+
+/// Looks through a text that begins with `head`; `looks` says at which of its columns. What is
+/// wrong is counted in `lost`.
 ///
 /// # Errors
 ///
-/// The first line that has more or fewer numbers than the first point, or something else.
+/// The first line that has more or fewer numbers than the first point, or something else, unless
+/// such lines are passed over.
 pub(super) fn survey(
     file: File,
     path: &Path,
     length: u64,
     head: &TextHead,
     looks: Vec<bool>,
+    mut lost: PartLosses,
 ) -> Result<TextSurvey> {
     let mut lines = Lines::new(file, path, [head.body, length], head.lines, LONGEST_LINE);
     let mut surveyor = Surveyor::new(path, head.separator, looks);
     let mut claimed: Option<u64> = None;
-    while let Some((start, end)) = lines.next()? {
+    while let Some((start, end)) = next(&mut lines, path, &mut lost)? {
         let (text, at) = (lines.text(start, end), lines.byte(start));
         let text = super::head::without_mark(text, at);
         if is_comment(text).is_some() {
@@ -159,7 +194,12 @@ pub(super) fn survey(
             continue;
         }
         surveyor.begin(at, lines.number() - 1, 0, 0, false);
-        surveyor.add(text, lines.number(), at)?;
+        // A line that is passed over says nothing of the columns.
+        let before = lost.mends().then(|| surveyor.facts.clone());
+        if let Err(error) = surveyor.add(text, lines.number(), at) {
+            lost.lose(path, at, 1, error)?;
+            surveyor.facts = before.unwrap_or_default();
+        }
     }
-    Ok(surveyor.finish(length, claimed))
+    Ok(TextSurvey { lost, ..surveyor.finish(length, claimed) })
 }

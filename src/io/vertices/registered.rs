@@ -8,6 +8,7 @@ use serde_json::json;
 use super::kind::VerticesKind;
 use super::lines::sniff;
 use super::source;
+use crate::host::standard;
 use crate::point::{Metadata, Schema};
 use crate::stage::{ChunkSize, Format, ReadKeys, Sink, Source, WriteKeys};
 use crate::{Error, Result};
@@ -73,7 +74,7 @@ impl Format for VerticesFormat {
         let opened = source::open(&[path.to_owned()], self.0, &ReadKeys::default())?;
         let dimensions: Vec<&str> =
             opened.schema().dimensions.iter().map(|d| d.name.as_str()).collect();
-        let bytes = std::fs::metadata(path).map_err(|e| Error::io(path, "look at it", e))?.len();
+        let bytes = standard::about(path)?.len();
         let (kind, points) = (self.0.names()[0], opened.points());
         Ok(json!({ "kind": kind, "bytes": bytes, "points": points, "dimensions": dimensions }))
     }

@@ -1,8 +1,8 @@
-//! Sizes of memory as people write them.
+//! Numbers of bytes as people write them.
 
 use serde::{Deserializer, de};
 
-use crate::quantity::has_schema;
+use super::has_schema;
 
 /// Bytes in a unit; the first of each is the one that messages use.
 const UNITS: [(&str, u64); 9] = [
@@ -21,8 +21,8 @@ const UNITS: [(&str, u64); 9] = [
 /// off.
 ///
 /// ```
-/// assert_eq!(pointmill::graph::parse_bytes("1.5GiB"), Ok(1_610_612_736));
-/// assert!(pointmill::graph::parse_bytes("2G").is_err());
+/// assert_eq!(pointmill::quantity::parse_bytes("1.5GiB"), Ok(1_610_612_736));
+/// assert!(pointmill::quantity::parse_bytes("2G").is_err());
 /// ```
 ///
 /// # Errors
@@ -67,7 +67,7 @@ fn meant(text: &str) -> Option<String> {
 }
 
 /// A size, as a key takes it.
-pub(super) struct SizeText;
+pub(crate) struct SizeText;
 
 has_schema!(SizeText, "SizeText", {
     "title": "a size (such as `\"2GiB\"`, or a number of bytes)",
@@ -80,7 +80,8 @@ has_schema!(SizeText, "SizeText", {
     ],
 });
 
-pub(super) fn some_bytes<'de, D: Deserializer<'de>>(from: D) -> Result<Option<u64>, D::Error> {
+/// Reads a size, as a text or as a number of bytes.
+pub(crate) fn some_bytes<'de, D: Deserializer<'de>>(from: D) -> Result<Option<u64>, D::Error> {
     struct Size;
     impl de::Visitor<'_> for Size {
         type Value = u64;

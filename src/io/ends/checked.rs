@@ -1,15 +1,15 @@
-//! What formats have no key for, and files whose format nothing tells.
+//! What is asked of a format that it does not have, and names that say no format: the errors.
 
 use std::path::Path;
 
 use crate::error::{listed, shown};
+use crate::host::standard;
 use crate::io::sniff::{of_extension, upper};
-use crate::quantity::Setting;
 use crate::stage::{Format, Formats, ReadKeys, WriteKeys};
 use crate::{Error, Result};
 
 /// Refuses keys that inputs of `format` do not have; tells which.
-pub(super) fn check_read(
+pub fn check_read(
     keys: &ReadKeys,
     format: &dyn Format,
     formats: &Formats,
@@ -24,7 +24,7 @@ pub(super) fn check_read(
 }
 
 /// Refuses keys that an output of `format` does not have; tells which.
-pub(super) fn check(
+pub fn check(
     keys: &WriteKeys,
     format: &dyn Format,
     formats: &Formats,
@@ -45,7 +45,7 @@ pub(super) fn check(
         let told = format!("`write.dimensions` asks for {name}, and {is} holds nothing computed");
         return Err(("dimensions", Error::pipeline(told).help("write LAS, PLY or another")));
     }
-    let offset = keys.offset.and_then(Setting::given);
+    let offset = keys.given_offset();
     match offset.is_some_and(|offset| offset.iter().any(|v| !v.is_finite())) {
         true => Err(("offset", Error::pipeline("an offset is three finite numbers"))),
         false => Ok(()),
@@ -53,10 +53,16 @@ pub(super) fn check(
 }
 
 /// The error of a file of which neither its extension nor `setting` says the format.
-pub(super) fn unknown_extension(path: &Path, setting: &str, formats: &Formats) -> Error {
+pub fn unknown_extension(path: &Path, setting: &str, formats: &Formats) -> Error {
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let name = shown(path);
     let is_read = setting.starts_with("read");
+    if standard::is_input(path) || standard::is_output(path) {
+        let names = formats.iter().filter(|format| is_read || format.unwritten().is_none());
+        let names = listed(names.map(|format| format.name()), "or");
+        let told = format!("nothing says the format of {name}");
+        return Error::pipeline(told).help(format!("give `{setting}`: {names}"));
+    }
     let can = if is_read { "read" } else { "written" };
     let known = formats.iter().filter(|format| is_read || format.unwritten().is_none());
     let dotted = listed(known.map(|format| format!(".{}", format.extension())), "or");

@@ -1,0 +1,364 @@
+//! One output that is split into files: by squares of the plane, by values of a dimension, by so
+//! many points or bytes; for whoever works on a scan piece by piece.
+//!
+//! Which files there are is known when the last record was read, and of thousands of files each
+//! cannot be open. So records are set down by file as they come, a few in memory and the rest in
+//! the spill; behind the last, a file is an item, and is written from begin to end by one thread.
+//! The stages before know nothing of it: to them this is one output.
+//!
+//! How often a file's records are set down depends on the order of the input, and may be often.
+//! What is where is therefore not listed in memory: each stretch of a file begins with the place of
+//! the one before it.
+
+mod sorter;
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
+
+use super::by_time::ByTime;
+use super::job::Job;
+use super::publish::Staged;
+use super::row::RowLayout;
+use crate::budget::Bytes;
+use crate::host::lock;
+use crate::point::{Metadata, PointBatch, Schema};
+use crate::stage::{
+    ChunkSize, CreateSink, Encode, Encoded, OutputSplit, Sink, SinkSummary, SplitKey,
+};
+use crate::store::{RecordState, Spill, StoredStretch};
+use crate::{Error, Result};
+use sorter::{NextPlace, SplitSorter};
+
+/// Files that an output is split into at most.
+pub(crate) const MOST_FILES: usize = 16_384;
+/// Bytes of records that wait in memory, of all files.
+const OPEN_BYTES: usize = 8 << 20;
+/// Bytes of a stretch at most.
+const STRETCH: usize = 256 << 10;
+/// Bytes of a file that are left for what an output says of its run, and for tables at its end.
+const RESERVE: u64 = 256 << 10;
+
+/// The records of one file that were not yet stored, and the last stretch of the others.
+#[derive(Debug, Default)]
+struct SplitList {
+    open: Vec<u8>,
+    last: Option<StoredStretch>,
+    records: u64,
+}
+
+/// The records that an output gets, by file; within one they stay in their order.
+pub(crate) struct BySplit {
+    split: OutputSplit,
+    sorter: SplitSorter,
+    schema: Arc<Schema>,
+    layout: RowLayout,
+    spill: Spill,
+    lists: Mutex<SplitLists>,
+}
+
+#[derive(Default)]
+struct SplitLists {
+    files: BTreeMap<SplitKey, SplitList>,
+    /// Bytes that wait in memory.
+    open: usize,
+}
+
+/// A file of a split, where it grew, what it was given and what it said.
+pub(crate) struct SplitFile {
+    pub path: PathBuf,
+    pub staged: Staged,
+    pub given: u64,
+    pub summary: SinkSummary,
+}
+
+/// Bytes that the lists of one output hold.
+pub(crate) fn lists_bytes() -> Bytes {
+    // A vector that grows has up to twice what is in it.
+    let list = size_of::<SplitKey>() + 2 * size_of::<SplitList>();
+    Bytes::from(2 * OPEN_BYTES) + Bytes::of(MOST_FILES as u64, list)
+}
+
+/// Bytes that a thread holds while it writes a file of a split, in chunks of this size whose
+/// records take `record` bytes.
+pub(crate) fn writing_bytes(chunk: ChunkSize, record: usize) -> Bytes {
+    let records = Bytes::of(chunk.points as u64, record);
+    records * 2 + Bytes(chunk.bytes) + Bytes::from(2 * STRETCH)
+}
+
+impl BySplit {
+    /// Without a record, for sink `sink` that is split like this and has chunks with rows like
+    /// these.
+    pub fn new(job: &Job<'_>, sink: usize, split: &OutputSplit, layout: RowLayout) -> Result<Self> {
+        let schema = job.task.schema().clone();
+        let missing = || Error::internal("records lack what they are split by");
+        let sorter = match split {
+            OutputSplit::Squares(side) => {
+                let [x, y, _] = schema.coordinates().ok_or_else(missing)?;
+                SplitSorter::Square([x.clone(), y.clone()], *side)
+            }
+            OutputSplit::Values(name) => {
+                SplitSorter::Value(schema.find(name).ok_or_else(missing)?.clone())
+            }
+            OutputSplit::Points(points) => SplitSorter::Points(*points),
+            OutputSplit::Bytes(bytes) => measured(job, sink, split, *bytes)?,
+        };
+        let (spill, split) = (Spill::new(&job.area, "split"), split.clone());
+        Ok(BySplit { split, sorter, schema, layout, spill, lists: Mutex::default() })
+    }
+
+    /// Bytes of a record with its row.
+    fn entry(&self) -> usize {
+        self.schema.stride + self.layout.bytes()
+    }
+
+    /// Takes `entries`, records of the file `key` each with its row.
+    fn take(&self, key: SplitKey, entries: &[u8]) -> Result<()> {
+        let lists = &mut *lock(&self.lists);
+        let full = lists.files.len() >= MOST_FILES;
+        if full && !lists.files.contains_key(&key) {
+            let told = format!("more than {MOST_FILES} {}", self.split.told());
+            return Err(Error::pipeline(told).help(self.split.remedy()));
+        }
+        let list = lists.files.entry(key).or_default();
+        list.open.extend_from_slice(entries);
+        list.records += (entries.len() / self.entry()) as u64;
+        lists.open += entries.len();
+        if lists.open > OPEN_BYTES {
+            lists.files.values_mut().try_for_each(|list| self.store(list))?;
+            lists.open = 0;
+        }
+        Ok(())
+    }
+
+    /// Stores what waits of a file, and gives its memory back.
+    fn store(&self, list: &mut SplitList) -> Result<()> {
+        let open = std::mem::take(&mut list.open);
+        let room = (STRETCH / self.entry()).max(1) * self.entry();
+        for entries in open.chunks(room) {
+            let mut stretch = StoredStretch::link(list.last).to_vec();
+            stretch.extend_from_slice(entries);
+            list.last = Some(self.spill.store(&stretch)?);
+        }
+        Ok(())
+    }
+
+    /// Calls `visit` with the records of a file and their rows, stretch by stretch.
+    fn each(&self, list: &SplitList, mut visit: impl FnMut(&[u8]) -> Result<()>) -> Result<()> {
+        let (mut chain, mut next, mut bytes) = (Vec::new(), list.last, Vec::new());
+        while let Some(stretch) = next {
+            chain.push(stretch);
+            self.spill.load(&stretch, &mut bytes)?;
+            next = StoredStretch::linked(&bytes)?;
+        }
+        for stretch in chain.iter().rev() {
+            self.spill.load(stretch, &mut bytes)?;
+            visit(&bytes[StoredStretch::LINK..])?;
+        }
+        visit(&list.open)
+    }
+
+    /// Writes all files, each thread one at a time.
+    pub fn write(&self, job: &Job<'_>, sink: usize) -> Result<Vec<SplitFile>> {
+        let lists = lock(&self.lists);
+        let missing = || Error::internal("an output that is split has no place");
+        let beside = job.outputs[sink].first().ok_or_else(missing)?;
+        let create = &job.task.sinks[sink];
+        let (mut sinks, mut staged) = (Vec::new(), Vec::new());
+        for key in lists.files.keys() {
+            let create = create.of_split(*key, &self.split)?;
+            staged.push(beside.in_same_folder(create.path())?);
+            sinks.push(create);
+        }
+        let lists: Vec<&SplitList> = lists.files.values().collect();
+        let mut said: Vec<SinkSummary> = Vec::with_capacity(lists.len());
+        job.items(lists.len()).run(
+            || (),
+            |(), n| {
+                let written = self.write_one(job, sink, (&*sinks[n], &staged[n]), lists[n]);
+                written.map_err(|error| staged[n].tell(error))
+            },
+            |summary| said.push(summary),
+            |()| Ok(()),
+        )?;
+        let each = sinks.iter().zip(staged).zip(lists).zip(said);
+        let mut files = Vec::with_capacity(sinks.len());
+        for (((create, staged), list), summary) in each {
+            let path = create.path().to_owned();
+            files.push(SplitFile { path, staged, given: list.records, summary });
+        }
+        Ok(files)
+    }
+
+    /// Records of all files.
+    pub fn records(&self) -> u64 {
+        lock(&self.lists).files.values().map(|list| list.records).sum()
+    }
+
+    fn write_one(
+        &self,
+        job: &Job<'_>,
+        number: usize,
+        (create, staged): (&dyn CreateSink, &Staged),
+        list: &SplitList,
+    ) -> Result<SinkSummary> {
+        let task = job.task;
+        let note = job.note(number, create.path());
+        let metadata = Metadata { note, ..task.metadata(number, Some(task.pipeline(number))) };
+        let mut sink = create.create(staged.file(), &self.schema, &metadata, false)?;
+        let (points, encoder) = (sink.chunk_points(), sink.encoder());
+        let by_time = by_time(job, number, create);
+        let mut batch = PointBatch::new(self.schema.clone(), points);
+        let mut rows = Vec::new();
+        let mut append = |batch: &mut PointBatch, rows: &mut Vec<u8>| {
+            let written = batch.len();
+            if self.layout.bytes() > 0 {
+                batch.columns = self.layout.spread(rows, std::iter::repeat_n(1, written));
+            }
+            if let Some(by_time) = &by_time {
+                by_time.sort(batch, &mut vec![RecordState::ALIVE; written]);
+            }
+            sink.append(encoder.encode(batch)?)?;
+            batch.clear();
+            rows.clear();
+            job.advance(written as u64)
+        };
+        self.each(list, |entries| {
+            entries.chunks_exact(self.entry()).try_for_each(|entry| {
+                let (record, row) = entry.split_at(self.schema.stride);
+                batch.extend(record);
+                rows.extend_from_slice(row);
+                if batch.len() < points { Ok(()) } else { append(&mut batch, &mut rows) }
+            })
+        })?;
+        if !batch.is_empty() {
+            append(&mut batch, &mut rows)?;
+        }
+        let summary = sink.finish()?;
+        match self.split {
+            OutputSplit::Bytes(most) if summary.bytes > most => {
+                let told = format!("a file takes {} bytes, more than {most}", summary.bytes);
+                Err(Error::internal(told).at(create.path()))
+            }
+            _ => Ok(summary),
+        }
+    }
+}
+
+/// How records are ordered within the chunks of a file of sink `number`, if not as they come.
+fn by_time(job: &Job<'_>, number: usize, create: &dyn CreateSink) -> Option<ByTime> {
+    let task = job.task;
+    let in_chunks = task.mills && !task.in_input_order[number] && create.likes_time();
+    in_chunks.then(|| ByTime::of(task.schema())).flatten()
+}
+
+/// What sorts records into files of `bytes` at most: what a file takes without points, an empty one
+/// tells.
+fn measured(job: &Job<'_>, number: usize, split: &OutputSplit, bytes: u64) -> Result<SplitSorter> {
+    let missing = || Error::internal("an output that is split has no place");
+    let create = job.task.sinks[number].of_split([1, 0], split)?;
+    let empty = job.outputs[number].first().ok_or_else(missing)?.scratch().path("empty")?;
+    let metadata = job.task.metadata(number, Some(job.task.pipeline(number)));
+    let sink = create.create(&empty, job.task.schema(), &metadata, false)?;
+    let encoder = sink.encoder();
+    let taken = sink.finish()?.bytes.saturating_add(RESERVE);
+    std::fs::remove_file(&empty).map_err(|e| Error::io(&empty, "remove it", e))?;
+    // Tables of chunks and checksums of pages grow with the points.
+    let room = bytes.saturating_sub(taken) / 100 * 99;
+    Ok(SplitSorter::Bytes(room, encoder, by_time(job, number, &*create)))
+}
+
+/// What stages see of an output of files: one sink, which takes records as they come.
+pub(crate) struct SplitSink {
+    files: Arc<BySplit>,
+    chunk: ChunkSize,
+    next: NextPlace,
+    given: u64,
+}
+
+impl SplitSink {
+    /// The sink that sets records down in `files`, in chunks of this size.
+    pub fn new(files: Arc<BySplit>, chunk: ChunkSize) -> Self {
+        SplitSink { files, chunk, next: NextPlace::default(), given: 0 }
+    }
+}
+
+/// Bytes of an encoded group of records before its entries: its file, or what the chunk takes, and
+/// their length.
+const GROUP: usize = 3 * size_of::<u64>();
+
+impl Sink for SplitSink {
+    fn chunk_points(&self) -> usize {
+        self.chunk.points
+    }
+
+    fn chunk_bytes(&self) -> u64 {
+        self.chunk.bytes
+    }
+
+    fn encoder(&self) -> Arc<dyn Encode> {
+        Arc::new(SplitEncoder(self.files.clone()))
+    }
+
+    fn append(&mut self, chunk: Encoded) -> Result<()> {
+        let mut rest = &chunk.bytes[..];
+        while let Some((head, more)) = rest.split_at_checked(GROUP) {
+            let word = |n: usize| {
+                let mut bytes = [0; 8];
+                bytes.copy_from_slice(&head[n * 8..(n + 1) * 8]);
+                i64::from_le_bytes(bytes)
+            };
+            let (entries, more) = more.split_at(word(2) as usize);
+            let files = &self.files;
+            match files.sorter.is_by_place() {
+                false => files.take([word(0), word(1)], entries)?,
+                true => {
+                    let each = (entries, files.entry());
+                    let (sorter, measured) = (&files.sorter, word(0) as u64);
+                    self.next.put(sorter, each, measured, |key, some| files.take(key, some))?;
+                }
+            }
+            rest = more;
+        }
+        self.given += chunk.points;
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>) -> Result<SinkSummary> {
+        Ok(SinkSummary::new(self.given, 0))
+    }
+}
+
+/// Sorts the records of a chunk by file; runs on all threads.
+struct SplitEncoder(Arc<BySplit>);
+
+impl Encode for SplitEncoder {
+    fn encode(&self, batch: &PointBatch) -> Result<Encoded> {
+        let (files, schema) = (&self.0, batch.schema());
+        let columns: Vec<(&[u8], usize)> = (files.layout.kinds().iter())
+            .map(|kind| {
+                let values = batch.columns.bytes_of(*kind);
+                let missing = || Error::internal("a column of an output that is split is missing");
+                Ok((values.ok_or_else(missing)?, kind.bytes()))
+            })
+            .collect::<Result<_>>()?;
+        let measured = [files.sorter.measure(batch)? as i64, 0];
+        let mut groups: BTreeMap<SplitKey, Vec<u8>> = BTreeMap::new();
+        for (i, record) in batch.iter().enumerate() {
+            let key = files.sorter.key(record, schema.endian)?.unwrap_or(measured);
+            let group = groups.entry(key).or_default();
+            group.extend_from_slice(record);
+            columns.iter().for_each(|(values, size)| {
+                group.extend_from_slice(&values[i * size..(i + 1) * size]);
+            });
+        }
+        let mut bytes = Vec::with_capacity(batch.len() * files.entry() + GROUP * groups.len());
+        for ([a, b], entries) in groups {
+            bytes.extend_from_slice(&a.to_le_bytes());
+            bytes.extend_from_slice(&b.to_le_bytes());
+            bytes.extend_from_slice(&(entries.len() as i64).to_le_bytes());
+            bytes.extend_from_slice(&entries);
+        }
+        Ok(Encoded::new(bytes, batch.len() as u64))
+    }
+}

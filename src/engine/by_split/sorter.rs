@@ -1,0 +1,154 @@
+//! What tells the files of a split apart: how the records of a chunk are sorted by file.
+
+use std::sync::Arc;
+
+use super::super::by_time::ByTime;
+use crate::budget::Bytes;
+use crate::point::{Dimension, Endian, PointBatch};
+use crate::stage::{Encode, SplitKey};
+use crate::store::RecordState;
+use crate::{Error, Result};
+
+/// Sides from the origin at most: whole numbers are exact in a `f64` up to here.
+const FARTHEST: f64 = (1u64 << 52) as f64;
+/// What sides are short of a whole number by, at most, if they are it: decimals are seldom exact in
+/// binary, and 0.3 lies on the border of squares of 0.1.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
+/// What a record says of the file that it belongs in.
+pub(super) enum SplitSorter {
+    /// Where it is, by the side of squares.
+    Square([Dimension; 2], f64),
+    /// A value of its own.
+    Value(Dimension),
+    /// Its place in the output, where a file has so many records.
+    Points(u64),
+    /// The same, where a file has as many chunks as fit so many bytes, encoded by this in the order
+    /// that they have in the file.
+    Bytes(u64, Arc<dyn Encode>, Option<ByTime>),
+}
+
+impl SplitSorter {
+    /// The file of a record; None where its place decides.
+    pub fn key(&self, record: &[u8], endian: Endian) -> Result<Option<SplitKey>> {
+        match self {
+            SplitSorter::Square(axes, side) => {
+                let [x, y] = axes;
+                let at = [x, y].map(|axis| axis.world(record, endian));
+                square(at, *side).map(Some)
+            }
+            SplitSorter::Value(dimension) => value(dimension, record, endian).map(Some),
+            SplitSorter::Points(_) | SplitSorter::Bytes(..) => Ok(None),
+        }
+    }
+
+    /// True if the place of a record decides, and not what it holds.
+    pub fn is_by_place(&self) -> bool {
+        matches!(self, SplitSorter::Points(_) | SplitSorter::Bytes(..))
+    }
+
+    /// Bytes that a chunk takes in a file, where these decide; else 0.
+    pub fn measure(&self, batch: &PointBatch) -> Result<u64> {
+        let SplitSorter::Bytes(_, encoder, by_time) = self else { return Ok(0) };
+        let encoded = match by_time {
+            None => encoder.encode(batch)?,
+            Some(by_time) => {
+                let (mut batch, mut states) =
+                    (batch.clone(), vec![RecordState::ALIVE; batch.len()]);
+                by_time.sort(&mut batch, &mut states);
+                encoder.encode(&batch)?
+            }
+        };
+        Ok(encoded.bytes.len() as u64)
+    }
+}
+
+/// The square of a position.
+fn square(position: [f64; 2], side: f64) -> Result<SplitKey> {
+    let mut square = [0; 2];
+    for (at, v) in square.iter_mut().zip(position) {
+        let sides = v / side;
+        let number = (sides + sides.abs() * ROUNDING).floor();
+        let is_near = number.abs() < FARTHEST;
+        if !is_near {
+            let told = format!("the point at {position:?} lies in no square of {side}");
+            return Err(Error::pipeline(told).help("give a larger `write.side`"));
+        }
+        *at = number as i64;
+    }
+    Ok(square)
+}
+
+/// The value of a record, which is a whole number.
+fn value(dimension: &Dimension, record: &[u8], endian: Endian) -> Result<SplitKey> {
+    let value = dimension.world(record, endian);
+    match value.fract() == 0.0 && value.abs() < FARTHEST {
+        true => Ok([value as i64, 0]),
+        false => {
+            let name = &dimension.name;
+            let told = format!("a point has {name} {value}, which is no whole number");
+            let help = "`write.by` takes a dimension of whole numbers, such as PointSourceId";
+            Err(Error::pipeline(told).help(help))
+        }
+    }
+}
+
+/// Where the next record of an output goes, whose places decide.
+#[derive(Default)]
+pub(super) struct NextPlace {
+    /// The number of the file that is filled, from 0, and what it has: records, or bytes.
+    file: i64,
+    filled: u64,
+}
+
+impl NextPlace {
+    /// Calls `take` with stretches of `entries`, each in so many bytes, and the files they go to.
+    /// They are one chunk, which takes `measured` bytes.
+    pub fn put<'e>(
+        &mut self,
+        sorter: &SplitSorter,
+        (entries, each): (&'e [u8], usize),
+        measured: u64,
+        mut take: impl FnMut(SplitKey, &'e [u8]) -> Result<()>,
+    ) -> Result<()> {
+        match sorter {
+            SplitSorter::Bytes(room, ..) => {
+                if measured > *room {
+                    return Err(too_small(entries.len() / each, measured, *room));
+                }
+                if self.filled + measured > *room {
+                    (self.file, self.filled) = (self.file + 1, 0);
+                }
+                self.filled += measured;
+                take([self.file + 1, 0], entries)
+            }
+            SplitSorter::Points(points) => {
+                let mut rest = entries;
+                while !rest.is_empty() {
+                    if self.filled == *points {
+                        (self.file, self.filled) = (self.file + 1, 0);
+                    }
+                    let left = (rest.len() / each) as u64;
+                    let now = left.min(points - self.filled);
+                    let (first, later) = rest.split_at(now as usize * each);
+                    take([self.file + 1, 0], first)?;
+                    (rest, self.filled) = (later, self.filled + now);
+                }
+                Ok(())
+            }
+            SplitSorter::Square(..) | SplitSorter::Value(_) => {
+                Err(Error::internal("records that say their file came by their place"))
+            }
+        }
+    }
+}
+
+/// The error of bytes that not even one chunk fits.
+fn too_small(points: usize, measured: u64, room: u64) -> Error {
+    let (chunk, room) = (Bytes(measured), Bytes(room));
+    let told = format!(
+        "`write.bytes` is too small: {points} points are written at once and take {chunk}, and a \
+         file has room for {room} of points"
+    );
+    Error::pipeline(told).help("give a larger size, or `write.points`")
+}
