@@ -265,7 +265,7 @@ mod tests {
     #[test]
     fn the_step_is_that_of_the_most_decimals() {
         for (coordinates, step) in [
-            (&[638_000.125, 1.5, -3.0][..], Some(1e-3)),
+            (&[638.125, 1.5, -3.0][..], Some(1e-3)),
             (&[1.0, 2.0], Some(1.0)),
             (&[0.1, 0.2], Some(1e-1)),
             (&[], Some(STEP_OF_NONE)),
@@ -290,8 +290,10 @@ mod tests {
     fn one_scale_is_for_all_axes_where_it_reaches() {
         let [fine, coarse] = [spread(&[0.001], false), spread(&[12.5], false)];
         assert_eq!(Spread([fine, coarse, coarse]).scale(None).unwrap(), [1e-3; 3]);
-        let [degrees, metres] = [spread(&[7.000_000_1], false), spread(&[0.5, 8_848.5], false)];
-        assert_eq!(Spread([degrees, degrees, metres]).scale(None).unwrap(), [1e-7, 1e-7, 1e-7]);
+        let [degrees, metres] = [spread(&[7.000_000_1], false), spread(&[-430.5, 8_848.5], false)];
+        let low = spread(&[0.5, 188.5], false);
+        assert_eq!(Spread([degrees, degrees, low]).scale(None).unwrap(), [1e-7; 3]);
+        assert_eq!(Spread([degrees, degrees, metres]).scale(None).unwrap(), [1e-7, 1e-7, 0.1]);
         let far = spread(&[-9e5, 9e5], false);
         assert_eq!(Spread([degrees, degrees, far]).scale(None).unwrap(), [1e-7, 1e-7, 1.0]);
         let third = spread(&[1.0 / 3.0], false);
