@@ -42,7 +42,7 @@ pub(crate) use source::BATCH;
 pub use source::{Contradiction, Input, OpenSource, Part, Source};
 pub use tile_op::{Forecast, ScanFacts, TileOp};
 pub use unread::Unread;
-pub use walk::PointWalk;
+pub use walk::{PointWalk, WalkProgress};
 pub(crate) use whole::enter_error;
 pub use whole::{WHOLE_RULES, read_whole};
 
