@@ -48,7 +48,7 @@ pub use source::{Contradiction, Input, OpenSource, Part, Source};
 pub use split::{OutputSplit, SplitKey};
 pub use tile_op::{Forecast, ScanFacts, TileOp};
 pub use unread::Unread;
-pub use walk::PointWalk;
+pub use walk::{PointWalk, WalkProgress};
 pub(crate) use whole::enter_error;
 pub use whole::{WHOLE_RULES, read_whole};
 

@@ -24,6 +24,7 @@ pub(super) fn compare_scans(
         noise: arguments.noise.as_ref().and(run.noise),
         withheld: arguments.withheld.as_ref().map(|_| run.withheld),
         distances: arguments.distances,
+        normals: arguments.normals,
         depth: arguments.depth(),
         accept,
         run,

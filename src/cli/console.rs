@@ -49,8 +49,12 @@ impl Console {
     /// plainly.
     pub fn new(command: &Command, registry: &Registry) -> Self {
         let common = command.common();
-        let progress = common.map_or(Progress::Never, |common| common.progress);
-        let quiet = common.is_some_and(|common| common.quiet);
+        // A look at a file has bars on a terminal, and is silent else.
+        let (usual, quiet) = match command {
+            Command::Validate(all) => (Progress::Auto, all.quiet),
+            _ => (Progress::Never, common.is_some_and(|common| common.quiet)),
+        };
+        let progress = common.map_or(usual, |common| common.progress);
         Console {
             voice: match progress {
                 Progress::Json => Voice::Json(Events::new()),

@@ -81,13 +81,15 @@ Examples:
   pointmill compare before.laz after.copc.laz --accept same
   pointmill compare survey/ reduced.ply --distances --accept 'subset, max <= 20cm'
   pointmill compare front.ply reduced.ply --axis x --pixels 512 --json
+  pointmill compare front.ply reduced.ply --normals --accept 'normals.p95 <= 5deg'
 
 Records are compared byte for byte where both scans have one layout, and by the values of the
 dimensions that both have elsewhere.
 
 Rules of --accept, between commas: same, same-order, subset (of the records of SECOND in FIRST),
-ordered-subset; and max, mean, rms, p50, p95 or p99 of the distances, with <= or < and a length,
-which imply --distances: the larger figure of both ways counts.
+ordered-subset; max, mean, rms, p50, p95 or p99 of the distances, with <= or < and a length, which
+imply --distances; normals.max and the others, with an angle, which imply --normals: the larger
+figure of both ways counts; and depth.rms, depth.mean, depth.max and depth.ssd, which imply --depth.
 
 In depth images, pixels that have points of one scan alone are counted and not compared.",
     ),
@@ -129,7 +131,10 @@ looked at all the same.",
 Examples:
   pointmill picture survey.laz -o survey.png
   pointmill picture survey.laz reduced.laz -o both.png --by class --from south
-  pointmill picture 'survey/*.laz' -o survey.png --width 4096",
+  pointmill picture 'survey/*.laz' -o survey.png --width 4096
+
+Files of every format that is read are drawn, in memory for the picture alone. Of COPC the levels
+alone are read that have a point for every pixel.",
     ),
     (
         "plan",

@@ -145,7 +145,7 @@ fn execute(command: &Command, registry: &Registry, console: &Console) -> Result<
         Command::New(arguments) => jobs::new(arguments),
         Command::Schema => stages::schema(registry),
         Command::Info(arguments) => describe::info(arguments, registry.formats(), console),
-        Command::Validate(arguments) => validate::validate(arguments, registry.formats()),
+        Command::Validate(arguments) => validate::validate(arguments, registry.formats(), console),
         Command::Picture(arguments) => picture::picture(arguments, registry.formats()),
         Command::Completions(arguments) => help::completions(arguments),
         Command::Man(arguments) => help::man(arguments),

@@ -115,8 +115,13 @@ fn range([low, high]: [f64; 2]) -> String {
 /// What the picture shows, as a few lines.
 fn told(picture: &Picture, arguments: &PictureArguments, bytes: u64) -> String {
     let mut told = String::new();
-    for (input, (points, outside)) in arguments.inputs.iter().zip(&picture.panels) {
-        told += &format!("scan       {input}, {} points", Grouped(*points));
+    let each = picture.panels.iter().zip(&picture.thinned_from);
+    for (input, ((points, outside), thinned_from)) in arguments.inputs.iter().zip(each) {
+        told += &format!("scan       {input}, {}", Grouped(*points));
+        if let Some(all) = thinned_from {
+            told += &format!(" of {}", Grouped(*all));
+        }
+        told += " points";
         if *outside > 0 {
             told += &format!(", {} of them outside of the picture", Grouped(*outside));
         }

@@ -5,23 +5,32 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::arguments::ValidateArguments;
+use super::console::Console;
 use super::print;
+use crate::engine::Watch;
 use crate::error::{listed, shown};
 use crate::io::ends::expand_any;
 use crate::report::Grouped;
-use crate::stage::{Finding, Formats, PLACES_TOLD, Severity};
+use crate::stage::{Finding, Formats, PLACES_TOLD, PointWalk, Severity, WalkProgress};
 use crate::{Error, ErrorKind, Result, io};
 
 /// How much can matter, in the order in which it is counted.
 const SEVERITIES: [Severity; 3] = [Severity::Fault, Severity::Warning, Severity::Note];
 
 /// Prints what is wrong with files; fails if one has a fault, once all were looked at.
-pub(super) fn validate(arguments: &ValidateArguments, formats: &Formats) -> Result<()> {
+pub(super) fn validate(
+    arguments: &ValidateArguments,
+    formats: &Formats,
+    console: &Console,
+) -> Result<()> {
     let files = expand_any(&arguments.files, formats)?;
     let (total, walk) = (files.len(), arguments.walk.walk());
     let (mut all, mut faulty) = (Vec::new(), Vec::new());
     for file in files {
-        let (findings, format) = io::validate(&file, formats, &walk)?;
+        let (findings, format) = console.watched(None, |watch| {
+            let walk = PointWalk { progress: Some(&Looked(watch)), ..walk };
+            io::validate(&file, formats, &walk)
+        })?;
         if findings.have_faults() {
             faulty.push(file.clone());
         }
@@ -44,6 +53,19 @@ pub(super) fn validate(arguments: &ValidateArguments, formats: &Formats) -> Resu
         true => error.help("without --quiet they are told"),
         false => error,
     })
+}
+
+/// Tells a watch how far the look at a file is.
+struct Looked<'a>(&'a dyn Watch);
+
+impl WalkProgress for Looked<'_> {
+    fn begin(&self, points: u64) {
+        self.0.phase("validate", Some(points));
+    }
+
+    fn advance(&self, points: u64) {
+        self.0.advance(points);
+    }
 }
 
 /// How many findings there are of each severity.

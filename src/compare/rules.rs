@@ -5,12 +5,12 @@ use std::ops::Range;
 
 use serde::Serialize;
 
-use super::clouds::{CloudDistances, CloudFigures};
+use super::figures::{FigureWord, Judged, RuleBound, example};
 use super::same::{PartOf, RecordsComparison, open};
 use crate::expression::ExpressionFault;
 use crate::language::Registry;
-use crate::quantity::{Figure, Length};
-use crate::report::{ACCEPT_RULES, Long, RuleText, length};
+use crate::quantity::Figure;
+use crate::report::{ACCEPT_RULES, Long, RuleText};
 use crate::{Error, ErrorKind, Result};
 
 /// What two scans must be beside each other, as rules between commas:
@@ -22,6 +22,10 @@ use crate::{Error, ErrorKind, Result};
 /// - `max`, `mean`, `rms`, `p50`, `p95` or `p99`, then `<=` or `<` and a length (in the scan's
 ///   unit, or such as `5mm`): how far points are from the nearest of the other scan, both ways; the
 ///   larger of the two figures counts.
+/// - `normals.max` and the others likewise with an angle (radians, or such as `5deg`): the angle
+///   between the normal of a point and that of the nearest point of the other scan.
+/// - `depth.rms`, `depth.mean` or `depth.max` with a length, and `depth.ssd` with a number, which
+///   is in the square of the scan's unit: what depth images differ by.
 #[derive(Debug, Clone)]
 pub struct CompareRules(Vec<CompareRule>);
 
@@ -37,7 +41,7 @@ struct CompareRule {
 enum RuleOf {
     Records(RecordsWord),
     /// A figure, whether it may be as large as the bound, and the bound.
-    Distance(DistanceWord, bool, Length),
+    Figure(FigureWord, bool, RuleBound),
 }
 
 /// What records must be.
@@ -49,23 +53,11 @@ enum RecordsWord {
     OrderedSubset,
 }
 
-/// A figure of distances.
-type DistanceWord = fn(&CloudFigures) -> f64;
-
 const RECORDS: [(&str, RecordsWord); 4] = [
     ("same", RecordsWord::Same),
     ("same-order", RecordsWord::SameOrder),
     ("subset", RecordsWord::Subset),
     ("ordered-subset", RecordsWord::OrderedSubset),
-];
-
-const DISTANCES: [(&str, DistanceWord); 6] = [
-    ("max", |figures| figures.max),
-    ("mean", |figures| figures.mean),
-    ("rms", |figures| figures.rms),
-    ("p50", |figures| figures.p50),
-    ("p95", |figures| figures.p95),
-    ("p99", |figures| figures.p99),
 ];
 
 impl CompareRules {
@@ -93,18 +85,32 @@ impl CompareRules {
 
     /// True if a rule is on distances.
     pub(super) fn measures(&self) -> bool {
-        self.0.iter().any(|rule| matches!(rule.of, RuleOf::Distance(..)))
+        self.is_on(|figure| matches!(figure, FigureWord::Distance(_)))
+    }
+
+    /// True if a rule is on the angles of normals.
+    pub(super) fn is_on_normals(&self) -> bool {
+        self.is_on(|figure| matches!(figure, FigureWord::Normals(_)))
+    }
+
+    /// True if a rule is on depth images.
+    pub(super) fn is_on_depth(&self) -> bool {
+        self.is_on(|figure| matches!(figure, FigureWord::Depth(_)))
+    }
+
+    fn is_on(&self, is_it: impl Fn(&FigureWord) -> bool) -> bool {
+        self.0.iter().any(|rule| matches!(&rule.of, RuleOf::Figure(figure, ..) if is_it(figure)))
     }
 
     /// The same with all lengths in the unit of the scan at `paths`.
     pub(super) fn in_scan(&self, paths: &[String], registry: &Registry) -> Result<CompareRules> {
         let mut rules = self.clone();
-        if !rules.measures() {
+        if !rules.measures() && !rules.is_on_depth() {
             return Ok(rules);
         }
         let source = open(paths, registry)?.open()?;
         for rule in &mut rules.0 {
-            if let RuleOf::Distance(_, _, bound) = &mut rule.of {
+            if let RuleOf::Figure(_, _, RuleBound::Length(bound)) = &mut rule.of {
                 let metres = Figure(bound.metres().unwrap_or_default());
                 let name = rule.text.split(['<', ' ']).next().unwrap_or_default();
                 let help = format!("write a number: `{name} <= {metres}` where it is metres");
@@ -116,26 +122,21 @@ impl CompareRules {
     }
 
     /// What the rules come to. Where nothing was measured, a rule on distances does not hold.
-    pub(super) fn judge(
-        &self,
-        records: &RecordsComparison,
-        distances: Option<&CloudDistances>,
-    ) -> CompareVerdict {
-        let unit = distances.and_then(|distances| distances.unit);
+    pub(super) fn judge(&self, all: &Judged<'_>) -> CompareVerdict {
         let judged = |rule: &CompareRule| {
-            let (passed, found, bound) = match rule.of {
-                RuleOf::Records(word) => (word.holds(records), None, None),
-                RuleOf::Distance(figure, may_be_equal, bound) => {
-                    let found = distances.and_then(|distances| distances.larger(figure));
+            let (passed, found, bound, unit) = match rule.of {
+                RuleOf::Records(word) => (word.holds(all.records), None, None, None),
+                RuleOf::Figure(figure, may_be_equal, bound) => {
+                    let (found, unit) = (figure.of(all), bound.unit(all));
                     let bound = bound.value();
                     let is_within = |v: f64| v < bound || may_be_equal && v == bound;
-                    (found.is_some_and(is_within), found, Some(bound))
+                    (found.is_some_and(is_within), found, Some(bound), unit)
                 }
             };
-            CompareRuleVerdict { rule: rule.text.clone(), passed, found, bound }
+            CompareRuleVerdict { rule: rule.text.clone(), passed, found, bound, unit }
         };
         let rules: Vec<CompareRuleVerdict> = self.0.iter().map(judged).collect();
-        CompareVerdict { passed: rules.iter().all(|rule| rule.passed), rules, unit }
+        CompareVerdict { passed: rules.iter().all(|rule| rule.passed), rules }
     }
 }
 
@@ -157,18 +158,17 @@ impl CompareRule {
         if let Some((_, word)) = RECORDS.iter().find(|(known, _)| *known == name) {
             return rule.alone(written(RuleOf::Records(*word)));
         }
-        let Some((_, figure)) = DISTANCES.iter().find(|(known, _)| *known == name) else {
+        let Some(figure) = FigureWord::named(name) else {
             let told = format!("there is no rule `{name}`");
             let records = RECORDS.iter().map(|(name, _)| (*name).to_owned());
-            let distances = DISTANCES.iter().map(|(name, _)| (*name).to_owned());
-            let all: Vec<String> = records.chain(distances).collect();
+            let all: Vec<String> = records.chain(FigureWord::names()).collect();
             return Err(ExpressionFault::word(rule.name_place(), told, name, "rules", &all));
         };
         let (behind, place) = rule.behind();
         let (may_be_equal, sign) = sign(name, behind, place)?;
         let (behind, place) = rule.bound(sign);
-        let bound = length(name, behind, place)?;
-        Ok(written(RuleOf::Distance(*figure, may_be_equal, bound)))
+        let bound = figure.bound(name, behind, place)?;
+        Ok(written(RuleOf::Figure(figure, may_be_equal, bound)))
     }
 }
 
@@ -185,7 +185,8 @@ fn sign(name: &str, text: &str, place: Range<usize>) -> Result<(bool, usize), Ex
         true => format!("`{name}` needs a bound"),
         false => format!("a rule bounds `{name}` from above"),
     };
-    Err(ExpressionFault::new(place, told).help(format!("write `{name} <= 5mm`")))
+    let help = format!("write `{name} <= {}`", example(name));
+    Err(ExpressionFault::new(place, told).help(help))
 }
 
 /// What the rules of a comparison come to.
@@ -196,8 +197,6 @@ pub struct CompareVerdict {
     pub passed: bool,
     /// Each rule, in order.
     pub rules: Vec<CompareRuleVerdict>,
-    #[serde(skip)]
-    unit: Option<&'static str>,
 }
 
 /// What a rule comes to.
@@ -208,29 +207,33 @@ pub struct CompareRuleVerdict {
     pub rule: String,
     /// True if it holds.
     pub passed: bool,
-    /// What was found, in the scan's unit; None of what is no figure, and where nothing was
-    /// measured.
+    /// What was found: lengths in the scan's unit, angles in degrees; None of what is no figure,
+    /// and where nothing was measured.
     pub found: Option<f64>,
     /// The bound in the same unit.
     pub bound: Option<f64>,
+    #[serde(skip)]
+    unit: Option<&'static str>,
+}
+
+impl CompareRuleVerdict {
+    /// The rule and what was found, in words.
+    fn told(&self) -> String {
+        match (self.bound, self.found) {
+            (Some(_), Some(found)) => {
+                format!("{}, and it is {}", self.rule, Long(found, self.unit))
+            }
+            (Some(_), None) => format!("{}, and the scans have no such figure", self.rule),
+            (None, _) => self.rule.clone(),
+        }
+    }
 }
 
 impl CompareVerdict {
-    /// A rule and what was found, in words.
-    fn told(&self, rule: &CompareRuleVerdict) -> String {
-        match (rule.bound, rule.found) {
-            (Some(_), Some(found)) => {
-                format!("{}, and it is {}", rule.rule, Long(found, self.unit))
-            }
-            (Some(_), None) => format!("{}, and a scan without points has no distance", rule.rule),
-            (None, _) => rule.rule.clone(),
-        }
-    }
-
     /// The error of rules that do not hold, if one does not.
     pub(super) fn accepted(&self) -> Result<()> {
         let failed = self.rules.iter().filter(|rule| !rule.passed);
-        let failed: Vec<String> = failed.map(|rule| self.told(rule)).collect();
+        let failed: Vec<String> = failed.map(CompareRuleVerdict::told).collect();
         match failed.is_empty() {
             true => Ok(()),
             false => {
@@ -246,7 +249,7 @@ impl fmt::Display for CompareVerdict {
         for (n, rule) in self.rules.iter().enumerate() {
             let before = if n == 0 { "accept    " } else { "\n          " };
             let verdict = if rule.passed { "PASS" } else { "FAIL" };
-            write!(f, "{before} {verdict}  {}", self.told(rule))?;
+            write!(f, "{before} {verdict}  {}", rule.told())?;
         }
         Ok(())
     }
@@ -261,8 +264,10 @@ mod tests {
         let read = CompareRules::read(" max<=5mm , p99 < 0.002,same, ordered-subset ").unwrap();
         let texts: Vec<&str> = read.0.iter().map(|rule| rule.text.as_str()).collect();
         assert_eq!(texts, ["max<=5mm", "p99 < 0.002", "same", "ordered-subset"]);
-        assert!(read.measures());
+        assert!(read.measures() && !read.is_on_normals() && !read.is_on_depth());
         assert!(!CompareRules::read("subset,same-order").unwrap().measures());
+        let read = CompareRules::read("normals.p95 <= 5deg, depth.ssd < 2").unwrap();
+        assert!(!read.measures() && read.is_on_normals() && read.is_on_depth());
     }
 
     #[test]
@@ -277,6 +282,12 @@ mod tests {
             ("p99 >= 1", 4..8, "a rule bounds `p99` from above"),
             ("p99 <= 5%", 7..9, "`p99` is bounded by a length above 0"),
             ("p99 <= 0", 7..8, "`p99` is bounded by a length above 0"),
+            ("normal.p99 <= 0", 0..10, "there is no rule `normal.p99`"),
+            ("normals.p99 <= 5mm", 15..18, "`normals.p99` is bounded by an angle above 0"),
+            ("normals.p99 <= 5", 15..16, "`normals.p99` is bounded by an angle above 0"),
+            ("depth.p99 <= 5", 0..9, "there is no rule `depth.p99`"),
+            ("depth.rms <= 5deg", 13..17, "`depth.rms` is bounded by a length above 0"),
+            ("depth.ssd <= 5mm", 13..16, "`depth.ssd` is bounded by a number above 0"),
         ] {
             let fault = CompareRules::read(text).unwrap_err();
             assert_eq!((fault.span, fault.told.as_str()), (place, told), "{text}");

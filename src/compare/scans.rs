@@ -1,12 +1,13 @@
-//! Two scans beside each other: their records, how far their points are from each other, and their
-//! depth images.
+//! Two scans beside each other: their records, how far their points are from each other, the angles
+//! between their normals, and their depth images.
 
 use std::fmt;
 
 use serde::Serialize;
 
-use super::clouds::{CloudDistances, cloud_distances};
+use super::clouds::{CloudDistances, NormalAngles, cloud_distances};
 use super::depth::{DepthErrors, DepthSettings, depth_errors};
+use super::figures::Judged;
 use super::left_out::looked_at;
 use super::rules::{CompareRules, CompareVerdict};
 use super::same::{RecordsComparison, compare_records};
@@ -15,6 +16,11 @@ use crate::engine::Watch;
 use crate::graph::{RunSettings, Treatment};
 use crate::language::Registry;
 use crate::ops::Axis;
+
+/// Pixels of depth images where nothing else is asked for.
+pub const DEPTH_PIXELS: usize = 1024;
+/// How depth images are seen for rules alone.
+const DEPTH_SEEN: (Axis, usize) = (Axis::Z, DEPTH_PIXELS);
 
 /// What two scans are compared by, besides their records.
 #[derive(Debug, Clone, Default)]
@@ -26,8 +32,10 @@ pub struct CompareSettings {
     pub withheld: Option<Treatment>,
     /// Whether distances are measured. Rules on them measure them in any case.
     pub distances: bool,
+    /// Whether the angles between normals are measured. Rules on them measure them in any case.
+    pub normals: bool,
     /// The axis that depth images look along and their pixels, 1 to 32,768 along the longer side;
-    /// None: there are none.
+    /// None: there are none, but for rules on them, which look along z in [`DEPTH_PIXELS`].
     pub depth: Option<(Axis, usize)>,
     /// What the result must be.
     pub accept: Option<CompareRules>,
@@ -44,6 +52,8 @@ pub struct ScanComparison {
     pub records: RecordsComparison,
     /// How far their points are from each other, if that was asked for.
     pub distances: Option<CloudDistances>,
+    /// What angles their normals have, if that was asked for.
+    pub normals: Option<NormalAngles>,
     /// What they differ by as depth images, if that was asked for.
     pub depth: Option<DepthErrors>,
     /// Whether the result is accepted, if there are rules.
@@ -95,8 +105,9 @@ impl ScanComparison {
 ///
 /// # Errors
 ///
-/// Files that cannot be read; points that have no place where distances are measured;
-/// rules in a unit that the scans do not tell; a memory or a disk that does not do.
+/// Files that cannot be read; points that have no place where distances are measured; a scan
+/// without normals where they are compared; rules in a unit that the scans do not tell; a memory or
+/// a disk that does not do.
 pub fn compare(
     first: &[String],
     second: &[String],
@@ -106,7 +117,10 @@ pub fn compare(
 ) -> Result<ScanComparison> {
     let CompareSettings { noise, withheld, depth, accept, run, .. } = settings;
     let accept = accept.as_ref().map(|rules| rules.in_scan(first, registry)).transpose()?;
-    let measures = settings.distances || accept.as_ref().is_some_and(CompareRules::measures);
+    let asks = |of: fn(&CompareRules) -> bool| accept.as_ref().is_some_and(of);
+    let measures = settings.distances || asks(CompareRules::measures);
+    let has_normals = settings.normals || asks(CompareRules::is_on_normals);
+    let depth = depth.or_else(|| asks(CompareRules::is_on_depth).then_some(DEPTH_SEEN));
     let paths = [first, second];
     let looked = looked_at(*noise, *withheld);
     let records = compare_records(paths, &looked, run, registry, watch)?;
@@ -116,15 +130,23 @@ pub fn compare(
         ..run.clone()
     };
     let looked = looked_at(run.noise, Some(run.withheld));
-    let distances =
-        measures.then(|| cloud_distances(paths, &looked, &run, registry, watch)).transpose()?;
+    let clouds = || cloud_distances(paths, (&looked, has_normals), &run, registry, watch);
+    let clouds = (measures || has_normals).then(clouds).transpose()?;
+    let (distances, normals) = clouds
+        .map_or((None, None), |(distances, normals)| (measures.then_some(distances), normals));
     let seen = |(axis, pixels): (Axis, usize)| {
         let settings = DepthSettings { axis, pixels, run: run.clone() };
         depth_errors(first, second, &settings, registry, watch)
     };
     let depth = depth.map(seen).transpose()?;
-    let accept = accept.map(|rules| rules.judge(&records, distances.as_ref()));
-    Ok(ScanComparison { records, distances, depth, accept })
+    let all = Judged {
+        records: &records,
+        distances: distances.as_ref(),
+        normals: normals.as_ref(),
+        depth: depth.as_ref(),
+    };
+    let accept = accept.map(|rules| rules.judge(&all));
+    Ok(ScanComparison { records, distances, normals, depth, accept })
 }
 
 impl fmt::Display for ScanComparison {
@@ -132,6 +154,9 @@ impl fmt::Display for ScanComparison {
         self.records.fmt(f)?;
         if let Some(distances) = &self.distances {
             write!(f, "\n{distances}")?;
+        }
+        if let Some(normals) = &self.normals {
+            write!(f, "\n{normals}")?;
         }
         if let Some(depth) = &self.depth {
             write!(f, "\n{depth}")?;

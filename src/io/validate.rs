@@ -31,7 +31,7 @@ use crate::{ErrorKind, Result};
 pub fn validate(
     path: &Path,
     formats: &Formats,
-    walk: &PointWalk,
+    walk: &PointWalk<'_>,
 ) -> Result<(Findings, Option<&'static str>)> {
     let (mut findings, mut name) = (Findings::default(), None);
     let checked = describe::format_of(path, formats).and_then(|format| {

@@ -5,6 +5,7 @@ use base64::engine::general_purpose::STANDARD;
 
 use crate::Result;
 use crate::picture::png_bytes;
+use png::Compression;
 
 /// Bytes of a picture's file at most; one that takes more is drawn half as wide.
 const MOST_BYTES: usize = 600_000;
@@ -24,10 +25,10 @@ impl Image {
     /// Of so many pixels across and down: red, green and blue of each, row by row from the top.
     pub fn of([width, height]: [u32; 2], pixels: &[u8]) -> Result<Image> {
         let (mut size, mut pixels) = ([width, height], pixels.to_vec());
-        let mut png = png_bytes(size, &pixels)?;
+        let mut png = png_bytes(size, &pixels, Compression::Balanced)?;
         while png.len() > MOST_BYTES && size.iter().all(|side| *side > 2) {
             (size, pixels) = halved(size, &pixels);
-            png = png_bytes(size, &pixels)?;
+            png = png_bytes(size, &pixels, Compression::Balanced)?;
         }
         let data = format!("data:image/png;base64,{}", STANDARD.encode(&png));
         Ok(Image { data, width: size[0], height: size[1] })

@@ -2,12 +2,16 @@
 //! it is coloured by; and the frame that follows from it.
 
 use super::settings::{ColorBy, NARROWEST, Settings, View};
-use crate::point::{Dimension, PointBatch};
+use crate::point::{Dimension, PointBatch, names};
 use crate::stage::{PointWalk, Source};
 use crate::{Error, ErrorKind, Result};
 
 /// Points of which the middle range of figures is found, about.
 const SAMPLE: u64 = 100_000;
+/// Times the extent of what was looked at that a header's box is at most, to be believed.
+const BELIEVED: f64 = 1.5;
+/// Pixels that a point is wide at most.
+const MOST_DOT: u32 = 5;
 
 /// Calls `visit` with every point of `source` that is somewhere: its number in its part, its world
 /// coordinates, and the values that it is coloured by; and `nowhere` for each of the others. Each
@@ -37,9 +41,14 @@ pub(super) fn each_point<S: Send>(
             }
         }
     };
-    let walk = PointWalk { threads, memory: u64::MAX };
+    let is_read = |d: &Dimension| {
+        names::XYZ.contains(&&*d.name) || fields.iter().any(|field| field.name == d.name)
+    };
+    let unread = schema.dimensions.iter().filter(|d| !is_read(d));
+    let unread: Vec<String> = unread.map(|d| d.name.to_string()).collect();
+    let walk = PointWalk { threads, memory: u64::MAX, progress: None };
     let begin = || (begin(), vec![0.0; fields.len()]);
-    let states = walk.each_batch(source, 0, begin, look, |_, _, error| Err(error))?;
+    let states = walk.each_batch(source, &unread, 0, begin, look, |_, _, error| Err(error))?;
     Ok(states.into_iter().map(|(state, _)| state).collect())
 }
 
@@ -101,6 +110,20 @@ impl Look {
         self.values = values.iter().fold(self.values, |range, &v| wider(range, [v; 2]));
         if is_sampled {
             self.sample.push([right, up, values.first().copied().unwrap_or(0.0)]);
+        }
+    }
+
+    /// Widens the extent to the `corners` that a header claims, where points of coarse levels are
+    /// all that was looked at: a few of the others lie beyond these. A header that claims much more
+    /// is not believed.
+    pub fn widen(&mut self, corners: [[f64; 3]; 2], view: View) {
+        let [one, two] = corners.map(|corner| view.seen(corner));
+        for (axis, range) in self.extent.iter_mut().enumerate() {
+            let claimed = wider([one[axis]; 2], [two[axis]; 2]);
+            let holds = claimed[0] <= range[0] && claimed[1] >= range[1];
+            if holds && claimed[1] - claimed[0] <= BELIEVED * (range[1] - range[0]) {
+                *range = claimed;
+            }
         }
     }
 
@@ -193,11 +216,13 @@ impl Frame {
         (inside(0) && inside(1)).then(|| at.map(|v| v as u32))
     }
 
-    /// Pixels that a point is wide, the same in all panels: so many that those of the scan with the
-    /// most points would about cover its panel.
-    pub fn dot(&self, looks: &[Look]) -> u32 {
-        let most = looks.iter().map(|look| look.points).max().unwrap_or(1).max(1);
-        let pixels = f64::from(self.size[0]) * f64::from(self.size[1]);
-        ((pixels / most as f64).sqrt().round() as u32).clamp(1, 5)
+    /// Pixels of a panel.
+    pub fn pixels(&self) -> u64 {
+        u64::from(self.size[0]) * u64::from(self.size[1])
+    }
+
+    /// Pixels that a point is wide, so that this many about cover a panel.
+    pub fn dot(&self, points: u64) -> u32 {
+        ((self.pixels() as f64 / points.max(1) as f64).sqrt().round() as u32).clamp(1, MOST_DOT)
     }
 }

@@ -2,10 +2,13 @@
 //! paths; a scan is whatever a [`Source`] yields.
 //!
 //! A scan is decoded twice: once for its extent and the range of what it is coloured by, since
-//! headers may be wrong about the first and silent about the second; once to draw. A pixel is one
-//! number, the nearness of its point above the point's colour, so that threads draw into one image
-//! by taking the larger number, and neither their number nor the order of points changes a pixel.
+//! headers may be wrong about the first and silent about the second; once to draw. Of COPC only the
+//! levels are read that have a point for every pixel, and some of these for the first look. A pixel
+//! is one number, the nearness of its point above the point's colour, so that threads draw into one
+//! image by taking the larger number, and neither their number nor the order of points changes a
+//! pixel.
 
+mod coarse;
 mod color;
 mod look;
 mod paint;
@@ -15,6 +18,7 @@ mod several;
 use crate::stage::Source;
 use crate::{Error, Result};
 
+use coarse::Drawn;
 pub(crate) use color::mixed;
 use look::{Frame, Look};
 use paint::Canvas;
@@ -24,6 +28,8 @@ pub(crate) use several::{DrawnPlace, draw_several};
 
 /// Panels that are drawn side by side, at most.
 pub const MOST_PANELS: usize = 4;
+/// Bytes of pixels from which on a picture is compressed for speed.
+const LARGE: usize = 3 << 20;
 /// Pixels between panels.
 const GAP: u32 = 8;
 
@@ -43,6 +49,9 @@ pub struct Picture {
     pub range: Option<[f64; 2]>,
     /// For each panel its points, and how many of them lie outside of the frame.
     pub panels: Vec<(u64, u64)>,
+    /// For each panel how many points the scan has, if only coarse levels of it were read, as they
+    /// do for the pixels.
+    pub thinned_from: Vec<Option<u64>>,
     /// For each panel the points that are drawn nowhere, since a coordinate of theirs is not
     /// finite.
     pub nowhere: Vec<u64>,
@@ -70,17 +79,19 @@ impl Picture {
             );
             return Err(Error::pipeline(told));
         }
-        let looks = sources.iter().map(|source| Look::at(*source, settings));
+        let most = [(settings.width - GAP * (panels - 1)) / panels, settings.width];
+        let looks = sources.iter().map(|source| Drawn::at_first(*source, most).look(settings));
         let looks = looks.collect::<Result<Vec<Look>>>()?;
-        let wide = (settings.width - GAP * (panels - 1)) / panels;
-        let frame = Frame::of(&looks, [wide, settings.width])?;
+        let frame = Frame::of(&looks, most)?;
         let range = settings.by.range(&looks);
-        let dot = frame.dot(&looks);
+        let largest = looks.iter().map(|look| look.points).max().unwrap_or(0);
+        let common = frame.dot(largest);
         let mut picture = Picture::blank(&frame, &looks, settings.by);
         for (n, source) in sources.iter().enumerate() {
-            let canvas = Canvas::new(frame.size, dot);
-            let outside = canvas.draw(*source, settings, &frame, range)?;
-            picture.panels.push((looks[n].points, outside));
+            let drawn = Drawn::within(*source, &frame, settings.view);
+            let canvas = Canvas::new(frame.size, drawn.dot(common));
+            picture.panels.push(canvas.draw(drawn.source(), settings, &frame, range)?);
+            picture.thinned_from.push(drawn.is_coarser().then(|| source.points()));
             picture.place(&canvas, n as u32 * (frame.size[0] + GAP));
         }
         Ok(picture)
@@ -98,6 +109,7 @@ impl Picture {
             pixel: frame.pixel,
             range: by.is_range().then(|| by.range(looks)),
             panels: Vec::new(),
+            thinned_from: Vec::new(),
             nowhere: looks.iter().map(|look| look.nowhere).collect(),
             black: looks.iter().map(|look| by.is_black(look)).collect(),
         }
@@ -120,7 +132,12 @@ impl Picture {
     ///
     /// Those of the encoder, which has none for a picture that was drawn.
     pub fn png(&self) -> Result<Vec<u8>> {
-        png_bytes([self.width, self.height], &self.pixels)
+        // Of a large picture of COPC a smaller file would take half of the time.
+        let compression = match self.pixels.len() {
+            0..LARGE => png::Compression::Balanced,
+            _ => png::Compression::Fast,
+        };
+        png_bytes([self.width, self.height], &self.pixels, compression)
     }
 }
 
@@ -130,11 +147,16 @@ impl Picture {
 /// # Errors
 ///
 /// Those of the encoder: pixels that are not as many.
-pub(crate) fn png_bytes([width, height]: [u32; 2], pixels: &[u8]) -> Result<Vec<u8>> {
+pub(crate) fn png_bytes(
+    [width, height]: [u32; 2],
+    pixels: &[u8],
+    compression: png::Compression,
+) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(compression);
     let wrong = |cause| Error::internal("the picture cannot be encoded").because(cause);
     let mut writer = encoder.write_header().map_err(wrong)?;
     writer.write_image_data(pixels).map_err(wrong)?;

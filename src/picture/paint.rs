@@ -35,27 +35,29 @@ impl Canvas {
         self.size
     }
 
-    /// Draws all points of `source`; returns how many lie outside of the frame.
+    /// Draws all points of `source`; returns how many there are, and how many of them lie outside
+    /// of the frame.
     pub fn draw(
         &self,
         source: &dyn Source,
         settings: &Settings,
         frame: &Frame,
         range: [f64; 2],
-    ) -> Result<u64> {
+    ) -> Result<(u64, u64)> {
         let by = settings.by;
-        let outside = each_point(
+        let counts = each_point(
             source,
             by,
             settings.threads,
-            || 0u64,
-            |outside, _, point, values| {
+            || (0, 0),
+            |(points, outside), _, point, values| {
                 let seen = settings.view.seen(point);
+                *points += 1;
                 *outside += u64::from(!self.point(seen, frame, by.color(values, range)));
             },
             |_| {},
         )?;
-        Ok(outside.into_iter().sum())
+        Ok(counts.into_iter().fold((0, 0), |all, one| (all.0 + one.0, all.1 + one.1)))
     }
 
     /// Draws a point as seen; false if it lies outside of the frame.

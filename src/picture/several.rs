@@ -100,7 +100,7 @@ pub(crate) fn draw_several(
         let wide = (width - GAP) / 2;
         let frame = Frame::of(&looks, [wide, wide])?;
         // Points of a panel about cover it, however few they are.
-        let dots = looks.iter().map(|look| frame.dot(std::slice::from_ref(look)).min(MOST_DOT));
+        let dots = looks.iter().map(|look| frame.dot(look.points).min(MOST_DOT));
         let canvases: Vec<Canvas> = dots.map(|dot| Canvas::new(frame.size, dot)).collect();
         let picture = Picture::blank(&frame, &looks, by);
         let settings = Settings { view, by, width, threads };

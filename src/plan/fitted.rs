@@ -224,6 +224,7 @@ fn settle(sorted: &mut Sorted, source: &dyn Source, settings: &RunSettings) -> R
     let walk = PointWalk {
         threads: settings.threads.map_or(usual.threads, NonZeroUsize::get),
         memory: settings.memory.unwrap_or(usual.memory),
+        ..usual
     };
     let mut streaming = sorted.transforms.iter().chain(&sorted.filters);
     let mover = streaming.find(|stage| stage.moves()).map(|stage| stage.kind.as_str());

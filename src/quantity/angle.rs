@@ -31,6 +31,11 @@ impl Angle {
         self.radians
     }
 
+    /// In degrees: as it was given, where it was in degrees.
+    pub(crate) fn in_degrees(self) -> f64 {
+        self.degrees.unwrap_or(self.radians / PI * 180.0)
+    }
+
     /// A figure in radians for a sentence, in the unit that `other` was given in.
     pub(crate) fn told_like(radians: f64, other: Angle) -> String {
         match other.degrees {
@@ -48,7 +53,7 @@ impl Angle {
     }
 
     /// Reads an angle with a unit: `6deg`, `6°`, `0.1rad`.
-    fn read(text: &str) -> Option<Angle> {
+    pub(crate) fn read(text: &str) -> Option<Angle> {
         let number = |text: &str| text.trim().parse::<f64>().ok();
         let degrees = text.strip_suffix("deg").or_else(|| text.strip_suffix('°'));
         match degrees {

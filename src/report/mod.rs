@@ -40,7 +40,7 @@ pub(crate) use ledger::check_written;
 pub use ledger::{Ledger, Removed};
 pub(crate) use lot::{Lot, Walked};
 pub use machine::Machine;
-pub(crate) use rule_text::{RuleText, length};
+pub(crate) use rule_text::{RuleText, angle, length};
 pub use stats::{DimensionFigures, DimensionHistogram, StatsFigures};
 pub(crate) use stats::{StatsTally, StoredNumbers};
 pub(crate) use survey::{FittedScan, ScanSurvey, report_tile_level};

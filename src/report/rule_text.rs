@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use crate::expression::ExpressionFault;
-use crate::quantity::Length;
+use crate::quantity::{Angle, Length};
 
 /// One rule of a text.
 pub(crate) struct RuleText<'a> {
@@ -87,5 +87,15 @@ pub(crate) fn length(
         let told = format!("`{name}` is bounded by a length above 0");
         let help = "write it in the scan's unit, or with mm, cm, m, km, in, ft or us-ft";
         ExpressionFault::new(place, told).help(help)
+    })
+}
+
+/// The angle that bounds the figure `name`: `text`, at `place`.
+pub(crate) fn angle(name: &str, text: &str, place: Range<usize>) -> Result<Angle, ExpressionFault> {
+    let number = text.parse().ok().and_then(Angle::radians);
+    let read = number.or_else(|| Angle::read(text)).filter(|angle| angle.in_radians() > 0.0);
+    read.ok_or_else(|| {
+        let told = format!("`{name}` is bounded by an angle above 0");
+        ExpressionFault::new(place, told).help("write it in degrees such as 5deg, or in radians")
     })
 }

@@ -99,7 +99,7 @@ pub trait Format: Send + Sync {
     /// # Errors
     ///
     /// What ends the look at the file; the caller enters it as a fault.
-    fn validate(&self, path: &Path, walk: &PointWalk, findings: &mut Findings) -> Result<()> {
+    fn validate(&self, path: &Path, walk: &PointWalk<'_>, findings: &mut Findings) -> Result<()> {
         let source = self.open(&[path.to_owned()], &ReadKeys::default())?;
         read_whole(&*source, walk, findings)
     }

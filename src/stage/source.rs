@@ -126,6 +126,13 @@ pub trait Source: Send + Sync {
         self.part(index)
     }
 
+    /// The same scan by its coarsest levels that have `points` points together, or a few more: a
+    /// thinner picture of the whole. None where its files have no levels that can be read by
+    /// themselves, and where all of them are needed for so many.
+    fn coarser(&self, _points: u64) -> Option<Box<dyn Source>> {
+        None
+    }
+
     /// True if its records come once: then none is looked at before the run.
     fn is_read_once(&self) -> bool {
         false

@@ -39,11 +39,16 @@ struct WholeSeen {
 /// # Errors
 ///
 /// A memory that does not do.
-pub fn read_whole(source: &dyn Source, walk: &PointWalk, findings: &mut Findings) -> Result<()> {
+pub fn read_whole(
+    source: &dyn Source,
+    walk: &PointWalk<'_>,
+    findings: &mut Findings,
+) -> Result<()> {
     let schema = source.schema();
     let axes = schema.coordinates();
     let states = walk.each_batch(
         source,
+        &[],
         size_of::<WholeSeen>() as u64,
         WholeSeen::default,
         |seen, _, _, batch| {

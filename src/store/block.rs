@@ -149,3 +149,12 @@ fn pack_as<const W: usize>(positions: &[Position], lo: Position, out: &mut Vec<u
         }
     }
 }
+
+/// The number of the first record of each position, where positions have so many `copies` each and
+/// the first of all is `record`.
+pub fn first_of_each(mut record: u64, copies: &[u32]) -> impl Iterator<Item = u64> + '_ {
+    copies.iter().map(move |&n| {
+        record += u64::from(n);
+        record - u64::from(n)
+    })
+}

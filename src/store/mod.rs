@@ -28,7 +28,7 @@ pub(crate) mod spill;
 mod tournament;
 
 pub use crate::geom::morton::morton_cmp;
-pub use block::{BLOCK, Block};
+pub use block::{BLOCK, Block, first_of_each};
 pub use cutting::CutError;
 pub use fetch::Fetch;
 pub use intake::{Intake, TileStore};

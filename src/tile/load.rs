@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use super::only::Only;
 use super::sieve::{MoreRuns, RecordRun, Runs, Sieve};
-use super::values::{DimensionColumns, first_of_each};
+use super::values::DimensionColumns;
 use super::{Fate, Tile};
 use crate::Result;
 use crate::budget::Bytes;
@@ -19,7 +19,7 @@ use crate::point::{Bounds, ColumnKind, NORMAL, Position};
 use crate::store::FATE_BYTES;
 use crate::store::Pieces;
 use crate::store::TileKey;
-use crate::store::{Reader, SealedTiles};
+use crate::store::{Reader, SealedTiles, first_of_each};
 
 /// Loads tiles into one arena that it reuses; one a thread.
 #[derive(Debug)]

@@ -12,7 +12,7 @@ use super::sieve::{RecordRun, Runs, Sieve};
 use crate::Result;
 use crate::point::{Position, distance2};
 use crate::store::morton_cmp;
-use crate::store::{Reader, SealedTiles};
+use crate::store::{Reader, SealedTiles, first_of_each};
 
 /// Decoded blocks that a search keeps for the next one.
 const CACHED: usize = 64;
@@ -89,6 +89,14 @@ impl Remote {
         found.clear();
         found.extend(self.found.iter().map(|found| found.position));
         Ok(found)
+    }
+
+    /// The number of the first record of the nearest position that was found last in `tiles`.
+    pub fn record_of_nearest(&mut self, tiles: &SealedTiles) -> Result<Option<u64>> {
+        let Some(nearest) = self.found.first() else { return Ok(None) };
+        let (_, copies) = tiles.read(nearest.block, &mut self.reader)?;
+        let first = tiles.block(nearest.block).first_record;
+        Ok(first_of_each(first, copies).nth(nearest.index as usize))
     }
 
     fn search(

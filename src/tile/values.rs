@@ -13,20 +13,11 @@ use super::remote::FoundPosition;
 use super::sieve::{ReadDimensions, RecordRun, Runs, Sieve};
 use crate::budget::Bytes;
 use crate::point::{ColumnKind, ColumnValue, Columns, PointBatch};
-use crate::store::{Fetch, Pieces, Reader, SealedTiles};
+use crate::store::{Fetch, Pieces, Reader, SealedTiles, first_of_each};
 use crate::{Error, Result};
 
 /// Records that are read together.
 const AT_ONCE: usize = 4096;
-
-/// The number of the first record of each position, where positions have so many `copies` each and
-/// the first of all is `record`.
-pub(super) fn first_of_each(mut record: u64, copies: &[u32]) -> impl Iterator<Item = u64> + '_ {
-    copies.iter().map(move |&n| {
-        record += u64::from(n);
-        record - u64::from(n)
-    })
-}
 
 /// Reads dimensions of records as columns; one a thread.
 #[derive(Debug)]

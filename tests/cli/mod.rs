@@ -1,6 +1,7 @@
 //! The command: its arguments, words and events.
 
 mod accept;
+mod angles;
 mod check;
 mod compare;
 mod deep;

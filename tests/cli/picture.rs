@@ -92,3 +92,101 @@ fn what_a_picture_lacks_is_told_in_words_and_with_what_can_be_done() {
     assert!(stderr.starts_with(nowhere) && stderr.lines().count() == 1, "{stderr}");
     assert!(stdout.contains("1600 × 64 pixels"), "a line of points: {stdout}");
 }
+
+#[test]
+fn every_format_that_is_read_is_drawn() {
+    let at = scans(&["a.laz"]);
+    let at = at.path();
+    let mut names = vec!["a.laz".to_owned()];
+    for extension in ["las", "copc.laz", "ply", "pcd", "e57", "csv", "xyz"] {
+        let name = format!("b.{extension}");
+        done(at, &["convert", "a.laz", "-o", &name, "--quiet"]);
+        names.push(name);
+    }
+    let corners = [[0, 0, 0], [9, 0, 1], [0, 9, 2], [9, 9, 5]];
+    let rows = |before: &str| -> String {
+        let row = |[x, y, z]: [i32; 3]| format!("{before}{x} {y} {z}\n");
+        corners.into_iter().map(row).collect()
+    };
+    let facet = format!(
+        "solid s\nfacet normal 0 0 1\nouter loop\n{}endloop\nendfacet\nendsolid s\n",
+        rows("vertex ").lines().take(3).map(|row| format!("{row}\n")).collect::<String>()
+    );
+    let pose = "1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
+    let cells: String = rows("").lines().map(|row| format!("{row} 0.5\n")).collect();
+    for (name, text) in [
+        ("c.obj", rows("v ")),
+        ("c.off", format!("OFF\n4 0 0\n{}", rows(""))),
+        ("c.stl", facet),
+        ("c.pts", format!("4\n{}", rows("").replace('\n', " 9 1 2 3\n"))),
+        ("c.ptx", format!("2\n2\n0 0 0\n{pose}{cells}")),
+    ] {
+        fs::write(at.join(name), text).unwrap();
+        names.push(name.to_owned());
+    }
+    for name in &names {
+        let (code, told, error) = pointmill(at, &["picture", name, "-o", "p.png", "--width", "90"]);
+        let points = match name.as_str() {
+            "c.stl" | "c.ptx" => "3 points",
+            name if name.starts_with('c') => "4 points",
+            _ => "3,000 points",
+        };
+        assert!(code == 0 && told.contains(&format!("{name}, {points}")), "{told}{error}");
+        fs::remove_file(at.join("p.png")).unwrap();
+    }
+    // Before and after, whatever the formats.
+    done(at, &["picture", "b.e57", "b.copc.laz", "b.csv", "-o", "p.png", "--width", "300"]);
+}
+
+/// Width, height and how many pixels of each hundred are white.
+fn white(path: &std::path::Path) -> (u32, u32, usize) {
+    let decoder = png::Decoder::new(std::io::BufReader::new(fs::File::open(path).unwrap()));
+    let mut reader = decoder.read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut pixels).unwrap();
+    let white = pixels.chunks_exact(3).filter(|pixel| **pixel == [255; 3]).count();
+    (info.width, info.height, 100 * white / (info.width * info.height) as usize)
+}
+
+#[test]
+fn of_copc_the_levels_are_read_that_the_pixels_need() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    done(at, &["synth", "als", "-n", "400k", "-o", "a.laz"]);
+    done(at, &["convert", "a.laz", "-o", "a.copc.laz", "--quiet"]);
+    let drawn = |input: &str, output: &str, more: &[&str]| -> (u64, u64) {
+        let all = [&["picture", input, "-o", output], more].concat();
+        let told = done(at, &all);
+        let counts =
+            told.split_once(&format!("{input}, ")).unwrap().1.split_once(" points").unwrap();
+        let number = |text: &str| text.replace(',', "").parse().unwrap();
+        match counts.0.split_once(" of ") {
+            Some((some, all)) => (number(some), number(all)),
+            None => (number(counts.0), number(counts.0)),
+        }
+    };
+    let small = ["--width", "128"];
+    let (some, all) = drawn("a.copc.laz", "some.png", &small);
+    assert!(all == 400_000 && (10_000..200_000).contains(&some), "{some} of {all}");
+    assert_eq!(drawn("a.laz", "all.png", &small), (400_000, 400_000));
+    let [some_seen, all_seen] = ["some.png", "all.png"].map(|name| white(&at.join(name)));
+    assert_eq!((some_seen.0, some_seen.1), (all_seen.0, all_seen.1), "the frame is the same");
+    assert!(some_seen.2 <= 5 && all_seen.2 <= 2, "{some_seen:?} {all_seen:?}");
+    let bytes = fs::read(at.join("some.png")).unwrap();
+    drawn("a.copc.laz", "some.png", &["--width", "128", "--threads", "1"]);
+    assert!(fs::read(at.join("some.png")).unwrap() == bytes);
+    let (more, _) = drawn("a.copc.laz", "p.png", &["--width", "300"]);
+    assert!(more > some, "more pixels have more levels: {more} {some}");
+    assert_eq!(drawn("a.copc.laz", "p.png", &["--width", "2000"]), (400_000, 400_000));
+    // An octree that cannot be followed is none.
+    let mut broken = fs::read(at.join("a.copc.laz")).unwrap();
+    broken[429 + 24..][..8].copy_from_slice(&f64::NAN.to_le_bytes());
+    fs::write(at.join("broken.copc.laz"), broken).unwrap();
+    assert_eq!(drawn("broken.copc.laz", "p.png", &small), (400_000, 400_000));
+    // A header that claims a box a hundred times as wide is not believed.
+    let mut wide = fs::read(at.join("a.copc.laz")).unwrap();
+    wide[179..187].copy_from_slice(&1e8f64.to_le_bytes());
+    fs::write(at.join("wide.copc.laz"), wide).unwrap();
+    done(at, &["picture", "wide.copc.laz", "-o", "p.png", "--width", "128"]);
+    assert!(white(&at.join("p.png")).2 <= 5);
+}

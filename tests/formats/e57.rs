@@ -206,3 +206,34 @@ fn damage_is_told_with_its_scan() {
     let (code, _, told) = pointmill(at, &["convert", "a.e57", "-o", "a.stl"]);
     assert_eq!(code, 2, "{told}");
 }
+
+#[test]
+fn points_beyond_the_bounds_that_a_scan_gives_are_a_fault() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    let points = [[0.0, 0.0, 0.0], [9.0, 5.0, 1.0]].map(|point| singles(&point)).to_vec();
+    let rotation = Quaternion { w: 1.0, x: 0.0, y: 0.0, z: 0.0 };
+    let translation = Translation { x: 100.0, y: 0.0, z: 0.0 };
+    // Bounds are in the coordinates of the scan, whatever its pose.
+    let pose = Some(Transform { rotation, translation });
+    file(&at.join("a.e57"), vec![(cartesian(&SINGLE), points, pose)]);
+    assert!(done(at, &["validate", "a.e57"]).contains("a.e57: "));
+    let mut bytes = std::fs::read(at.join("a.e57")).unwrap();
+    let name = b"<xMaximum";
+    let start = bytes.windows(name.len()).position(|some| some == name).unwrap();
+    let digit = start + bytes[start..].iter().position(|&byte| byte == b'>').unwrap() + 1;
+    assert_eq!(bytes[digit], b'9');
+    bytes[digit] = b'4';
+    for page in bytes.chunks_exact_mut(1024) {
+        let sum = crc32c::crc32c(&page[..1020]);
+        page[1020..].copy_from_slice(&sum.to_be_bytes());
+    }
+    std::fs::write(at.join("a.e57"), bytes).unwrap();
+    let (code, told, _) = pointmill(at, &["validate", "a.e57"]);
+    assert_eq!(code, 1);
+    assert!(told.contains("(e57-bounds-hold)"), "{told}");
+    assert!(
+        told.contains("x of points from 0 to 9, and the bounds of scan 1 are 0 to 4"),
+        "{told}"
+    );
+}

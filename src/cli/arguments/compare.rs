@@ -3,7 +3,7 @@
 use clap::{Args, ValueEnum};
 
 use super::shared::CommonArguments;
-use crate::compare::MOST_PIXELS;
+use crate::compare::{DEPTH_PIXELS, MOST_PIXELS};
 use crate::ops::Axis;
 use crate::quantity::parse_count;
 
@@ -19,6 +19,10 @@ pub(crate) struct CompareArguments {
     /// plane of its 8 nearest; exact, whatever the size of the scans
     #[arg(long)]
     pub distances: bool,
+    /// Measure the angle between the normal of each point and that of the nearest point of the
+    /// other scan, without their signs; both must have normals
+    #[arg(long)]
+    pub normals: bool,
     /// Compare both as depth images, too: sum of squared differences and their RMS
     #[arg(long)]
     pub depth: bool,
@@ -53,7 +57,7 @@ impl CompareArguments {
     pub fn depth(&self) -> Option<(Axis, usize)> {
         let is_asked = self.depth || self.axis.is_some() || self.pixels.is_some();
         let axis = self.axis.unwrap_or(AxisName::Z).into();
-        is_asked.then(|| (axis, self.pixels.unwrap_or(1024) as usize))
+        is_asked.then(|| (axis, self.pixels.map_or(DEPTH_PIXELS, |pixels| pixels as usize)))
     }
 }
 

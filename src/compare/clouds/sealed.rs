@@ -1,8 +1,9 @@
 //! The places of a scan, in Morton order, in memory or on disk: decoded, sorted and merged as a run
-//! does it, with no record beside them.
+//! does it, with no record beside them but for its normal, where that is compared.
 
 use std::sync::Arc;
 
+use super::normals::{NORMAL_BYTES, RecordNormals};
 use crate::budget::{Budget, Lease};
 use crate::engine::Watch;
 use crate::geom::lattice::{Lattice, Misplaced};
@@ -16,10 +17,15 @@ use crate::stage::{BATCH, Source};
 use crate::store::{Intake, SealedTiles, SpillArea, TileStore, seal};
 use crate::{Error, ErrorKind, Result};
 
-/// Bytes of a record in the store, whose place is all that is kept of it.
-pub const STRIDE: usize = 1;
-/// What is stored of records.
+/// Bytes of a record in the store where its place is all that is kept of it.
+const STRIDE: usize = 1;
+/// What is stored of these.
 const NOTHING: [u8; BATCH * STRIDE] = [0; BATCH * STRIDE];
+
+/// Bytes of what is kept of a record besides its place.
+pub fn stride(has_normals: bool) -> usize {
+    if has_normals { NORMAL_BYTES } else { STRIDE }
+}
 
 /// How records come to their places.
 pub enum Placing {
@@ -85,6 +91,8 @@ impl Placing {
 pub struct SealSettings<'a> {
     pub placing: &'a Placing,
     pub left_out: &'a Selection,
+    /// Whether normals are kept of records that have them.
+    pub has_normals: bool,
     pub nonfinite: Nonfinite,
     /// Records that a thread sorts at once.
     pub run_records: usize,
@@ -99,6 +107,7 @@ struct SealArena<'a> {
     intake: Intake<'a>,
     batch: PointBatch,
     positions: Vec<Position>,
+    normals: Vec<u8>,
 }
 
 impl SealSettings<'_> {
@@ -106,12 +115,17 @@ impl SealSettings<'_> {
     /// hold until all are read.
     pub fn seal(&self, source: &dyn Source, sorting: Lease) -> Result<SealedTiles> {
         let schema = source.schema();
-        let is_read =
-            |name: &str| names::XYZ.contains(&name) || self.left_out.names().contains(&name);
+        let is_read = |name: &str| {
+            names::XYZ.contains(&name)
+                || self.left_out.names().contains(&name)
+                || self.has_normals && names::NORMAL.contains(&name)
+        };
         let unread = schema.dimensions.iter().map(|d| d.name.clone());
         let unread: Vec<String> = unread.filter(|name| !is_read(name)).collect();
         let chosen = (!self.left_out.is_all()).then(|| self.left_out.of(schema));
-        let store = TileStore::new(self.area, self.budget, STRIDE, false);
+        let normals = RecordNormals::of(schema).filter(|_| self.has_normals);
+        let stride = stride(self.has_normals);
+        let store = TileStore::new(self.area, self.budget, stride, false);
         self.watch.phase("decode", Some(source.points()));
         let mut dropped = 0;
         self.threads.items(source.parts(), || {}).run(
@@ -119,6 +133,7 @@ impl SealSettings<'_> {
                 intake: Intake::new(&store, self.run_records),
                 batch: PointBatch::new(schema.clone(), BATCH),
                 positions: Vec::with_capacity(BATCH),
+                normals: Vec::new(),
             },
             |arena, index| {
                 let mut part = source.part_without(index, &unread)?;
@@ -129,7 +144,7 @@ impl SealSettings<'_> {
                     if arena.batch.is_empty() {
                         return Ok(nowhere);
                     }
-                    nowhere += self.take(source, chosen.as_ref(), arena)?;
+                    nowhere += self.take(source, (chosen.as_ref(), normals.as_ref()), arena)?;
                     self.advance(arena.batch.len() as u64)?;
                 }
             },
@@ -155,11 +170,12 @@ impl SealSettings<'_> {
     fn take(
         &self,
         source: &dyn Source,
-        chosen: Option<&Chooser>,
+        (chosen, normals): (Option<&Chooser>, Option<&RecordNormals<'_>>),
         arena: &mut SealArena<'_>,
     ) -> Result<u64> {
-        let SealArena { intake, batch, positions } = arena;
+        let SealArena { intake, batch, positions, normals: stored } = arena;
         positions.clear();
+        stored.clear();
         let record = |i: usize| {
             let stride = batch.schema().stride;
             &batch.records()[i * stride..(i + 1) * stride]
@@ -171,6 +187,7 @@ impl SealSettings<'_> {
             |i, position| {
                 if is_chosen(i) {
                     positions.push(position);
+                    normals.iter().for_each(|normals| normals.store(record(i), stored));
                 }
             },
             |i, why| {
@@ -179,8 +196,12 @@ impl SealSettings<'_> {
                 }
             },
         );
-        for positions in positions.chunks(BATCH) {
-            intake.take(positions, &NOTHING[..positions.len() * STRIDE], &[])?;
+        for (n, positions) in positions.chunks(BATCH).enumerate() {
+            let records = match normals {
+                None => &NOTHING[..positions.len() * STRIDE],
+                Some(_) => &stored[n * BATCH * NORMAL_BYTES..][..positions.len() * NORMAL_BYTES],
+            };
+            intake.take(positions, records, &[])?;
         }
         let drops =
             |why: &Misplaced| *why == Misplaced::NotFinite && self.nonfinite == Nonfinite::Drop;

@@ -4,7 +4,8 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::walk::{MeasuredCloud, MeasuredKind};
+use super::measured::MeasuredKind;
+use super::walk::MeasuredCloud;
 use crate::report::{Coordinate, Grouped, Long};
 use crate::stage::Lattice;
 
@@ -39,7 +40,7 @@ pub struct CloudDirection {
     pub plane: CloudFigures,
 }
 
-/// Distances in the scan's unit. Percentiles are upper edges of bins of 1 %.
+/// Distances in the scan's unit, or angles in degrees. Percentiles are upper edges of bins of 1 %.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct CloudFigures {
@@ -63,9 +64,18 @@ pub struct CloudFigures {
 
 impl CloudFigures {
     fn of(measured: &MeasuredKind, lattice: &Lattice) -> Option<CloudFigures> {
+        CloudFigures::scaled(measured, lattice, lattice.step)
+    }
+
+    /// The figures in units of which what was measured is so many.
+    pub(super) fn scaled(
+        measured: &MeasuredKind,
+        lattice: &Lattice,
+        unit: f64,
+    ) -> Option<CloudFigures> {
         let deviations = &measured.deviations.deviations;
         let (max, at) = deviations.largest()?;
-        let length = |steps: f64| steps * lattice.step;
+        let length = |figure: f64| figure * unit;
         let deviation = |percent| measured.deviations.percentile(percent).map(f64::from);
         let percentile = |percent| deviation(percent).map(length);
         let points = deviations.count();

@@ -10,14 +10,14 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
+use super::measured::MeasuredKind;
+use super::normals::{MeasuredNormals, NormalPairs};
 use crate::Result;
 use crate::compare::planes::{RemovedPoint, SurfacePlanes};
 use crate::geom::nearest::NearestAmong;
 use crate::geom::simd::Simd;
 use crate::point::{Bounds, Position, distance2};
-use crate::report::deviations::MeasuredDeviations;
-use crate::report::sums::FixedSum;
-use crate::store::{BLOCK, Reader, SealedTiles, morton_cmp};
+use crate::store::{BLOCK, Reader, SealedTiles, first_of_each, morton_cmp};
 use crate::tile::{LoadedBox, Remote};
 
 /// The surface at a position is the plane of so many points, the nearest.
@@ -36,26 +36,8 @@ pub struct MeasuredCloud {
     pub nearest: MeasuredKind,
     /// From the plane of the nearest ones.
     pub plane: MeasuredKind,
-}
-
-/// Distances of one kind.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct MeasuredKind {
-    pub deviations: MeasuredDeviations,
-    pub sum: FixedSum,
-}
-
-impl MeasuredKind {
-    fn add(&mut self, distance: f64, position: Position, copies: u32) {
-        let distance = distance as f32;
-        self.deviations.add(distance, position, copies);
-        self.sum.add(f64::from(distance), copies);
-    }
-
-    fn merge(&mut self, other: &MeasuredKind) {
-        self.deviations.merge(&other.deviations);
-        self.sum.merge(&other.sum);
-    }
+    /// Angles between normals; none where they are not compared.
+    pub normals: Option<MeasuredNormals>,
 }
 
 impl MeasuredCloud {
@@ -63,6 +45,9 @@ impl MeasuredCloud {
     pub fn merge(&mut self, other: &MeasuredCloud) {
         self.nearest.merge(&other.nearest);
         self.plane.merge(&other.plane);
+        if let Some(normals) = &other.normals {
+            self.normals.get_or_insert_default().merge(normals);
+        }
     }
 
     /// Enters positions with how far they are from the nearest point, and from a surface.
@@ -76,7 +61,7 @@ impl MeasuredCloud {
 
 /// What a thread works with.
 pub struct WalkArena {
-    pub measured: MeasuredCloud,
+    measured: MeasuredCloud,
     reader: Reader,
     remote: Remote,
     nearest: NearestAmong,
@@ -85,18 +70,29 @@ pub struct WalkArena {
     asking: Vec<Position>,
     /// Positions that ask and have several records.
     repeated: Vec<(Position, u32)>,
+    normals: Option<NormalPairs>,
 }
 
 impl WalkArena {
     /// Bytes that it holds.
-    pub fn bytes() -> u64 {
+    pub fn bytes(has_normals: bool) -> u64 {
         let positions = LOADED as usize + STRETCH * BLOCK;
+        let normals = match has_normals {
+            true => NormalPairs::bytes(LOADED as usize, STRETCH * BLOCK),
+            false => 0,
+        };
         let search = NearestAmong::bytes(LOADED as usize, STRETCH * BLOCK, SURFACE);
-        (2 * positions * size_of::<Position>() + search) as u64 + Remote::BYTES + (1 << 20)
+        let own = (2 * positions * size_of::<Position>() + search) as u64;
+        own + Remote::BYTES + normals + (1 << 20)
+    }
+
+    /// All that was measured.
+    pub fn all(self) -> MeasuredCloud {
+        MeasuredCloud { normals: self.normals.map(|pairs| pairs.measured), ..self.measured }
     }
 
     /// For searches by this instruction set.
-    pub fn with(simd: Simd) -> WalkArena {
+    pub fn with(simd: Simd, has_normals: bool) -> WalkArena {
         WalkArena {
             measured: MeasuredCloud::default(),
             reader: Reader::default(),
@@ -106,6 +102,7 @@ impl WalkArena {
             near: Vec::new(),
             asking: Vec::new(),
             repeated: Vec::new(),
+            normals: has_normals.then(NormalPairs::new),
         }
     }
 }
@@ -144,17 +141,20 @@ impl CloudWalk<'_> {
             }
         }
         self.search_remotely(arena)?;
-        let WalkArena { planes, measured, repeated, .. } = arena;
+        let WalkArena { planes, measured, repeated, normals, .. } = arena;
         planes.flush(|asked, plane| measured.enter(asked, plane, repeated));
-        Ok(())
+        normals.iter_mut().try_for_each(|pairs| pairs.measure(self.asking, self.asked))
     }
 
     /// Has the positions of `blocks` ask.
     fn ask(&self, blocks: Range<usize>, arena: &mut WalkArena) -> Result<()> {
         arena.asking.clear();
         arena.repeated.clear();
+        arena.normals.iter_mut().for_each(NormalPairs::begin);
         for block in blocks {
+            let first = self.asking.block(block).first_record;
             let (positions, copies) = self.asking.read(block, &mut arena.reader)?;
+            arena.normals.iter_mut().for_each(|pairs| pairs.ask(positions, copies, first));
             arena.asking.extend_from_slice(positions);
             let repeated = positions.iter().zip(copies).filter(|(_, copies)| **copies != 1);
             arena.repeated.extend(repeated.map(|(p, copies)| (*p, *copies)));
@@ -184,11 +184,20 @@ impl CloudWalk<'_> {
     /// Measures those that ask whose neighbours are in `region` for certain; the others go on
     /// asking.
     fn search(&self, region: &Bounds, arena: &mut WalkArena) -> Result<()> {
-        let WalkArena { measured, reader, nearest, planes, near, asking, repeated, .. } = arena;
+        let WalkArena {
+            measured, reader, nearest, planes, near, asking, repeated, normals, ..
+        } = arena;
         near.clear();
+        normals.iter_mut().for_each(|pairs| pairs.near.clear());
         self.asked.blocks_meeting(region, |block| {
             let is_whole = region.holds(&self.asked.block(block).bounds);
-            let (positions, _) = self.asked.read(block, reader)?;
+            let (positions, copies) = self.asked.read(block, reader)?;
+            if let Some(pairs) = normals {
+                let records = first_of_each(self.asked.block(block).first_record, copies);
+                let near = positions.iter().zip(records);
+                let near = near.filter(|(p, _)| is_whole || region.contains(**p));
+                pairs.near.extend(near.map(|(_, record)| record));
+            }
             match is_whole {
                 true => near.extend_from_slice(positions),
                 false => near.extend(positions.iter().filter(|p| region.contains(**p))),
@@ -205,6 +214,9 @@ impl CloudWalk<'_> {
             // Where it is itself, nothing else is looked at.
             let is_shared = found.first().is_some_and(|j| at(j) == p);
             if is_shared || is_all || found.len() == SURFACE && loaded.proves(p, farthest) {
+                if let (Some(pairs), Some(j)) = (normals.as_mut(), found.first()) {
+                    pairs.enter(p, pairs.near[*j as usize]);
+                }
                 let mut enter = |asked, plane| measured.enter(asked, plane, repeated);
                 measure(p, found.iter().map(at), planes, &mut enter);
             } else {
@@ -218,11 +230,16 @@ impl CloudWalk<'_> {
 
     /// Measures those that still ask, one by one.
     fn search_remotely(&self, arena: &mut WalkArena) -> Result<()> {
-        let WalkArena { measured, remote, planes, near, asking, repeated, .. } = arena;
+        let WalkArena { measured, remote, planes, near, asking, repeated, normals, .. } = arena;
         for &p in asking.iter() {
             let found = remote.nearest_to(self.asked, p, SURFACE, near)?;
             let mut enter = |asked, plane| measured.enter(asked, plane, repeated);
             measure(p, found.iter().copied(), planes, &mut enter);
+            if let Some(pairs) = normals
+                && let Some(record) = remote.record_of_nearest(self.asked)?
+            {
+                pairs.enter(p, record);
+            }
         }
         asking.clear();
         Ok(())

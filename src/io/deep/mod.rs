@@ -131,7 +131,7 @@ pub struct QuantileFigures {
 /// # Errors
 ///
 /// A file of no format among `formats`, points that cannot be read, a memory that does not do.
-pub fn deep(path: &Path, formats: &Formats, walk: &PointWalk) -> Result<DeepFigures> {
+pub fn deep(path: &Path, formats: &Formats, walk: &PointWalk<'_>) -> Result<DeepFigures> {
     let format = describe::format_of(path, formats)?;
     let told = |error| sniff::told(error, &**format, formats);
     let files: [PathBuf; 1] = [path.to_owned()];
@@ -152,11 +152,12 @@ struct DeepSeen {
     failed: Option<Error>,
 }
 
-fn look(source: &dyn Source, walk: &PointWalk) -> Result<DeepFigures> {
+fn look(source: &dyn Source, walk: &PointWalk<'_>) -> Result<DeepFigures> {
     let schema = source.schema();
     let own = CELL_BYTES + 2 * SPREAD_BYTES + 4096 * schema.dimensions.len() as u64;
     let seen = walk.each_batch(
         source,
+        &[],
         own,
         DeepSeen::default,
         |seen, _, _, batch| {

@@ -2,6 +2,7 @@
 
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use e57::{E57Reader, PointCloud, RecordDataType};
@@ -30,6 +31,8 @@ pub(super) struct E57Scan {
     pub bits: u64,
     /// Points that the file says are invalid and that were met so far.
     pub invalid: AtomicU64,
+    /// What its points that were read to the end lie in, in its own coordinates.
+    pub seen: Mutex<Option<[[f64; 3]; 2]>>,
 }
 
 /// One file.
@@ -125,7 +128,8 @@ fn scan(path: &Path, length: u64, number: u64, cloud: PointCloud) -> Result<E57S
     if pose.is_some_and(|pose| !pose.is_finite()) {
         return Err(fail("its pose is no turn and shift".to_owned()));
     }
-    Ok(E57Scan { cloud, pose, meanings, number, bits, invalid: AtomicU64::new(0) })
+    let (invalid, seen) = (AtomicU64::new(0), Mutex::new(None));
+    Ok(E57Scan { cloud, pose, meanings, number, bits, invalid, seen })
 }
 
 /// Bits of a value.

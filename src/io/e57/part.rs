@@ -9,6 +9,7 @@ use super::fields::{Meaning, plain};
 use super::file::{E57File, E57Scan, reader, unreadable};
 use super::names::RECORDS;
 use super::reading::Windowed;
+use crate::host::lock;
 use crate::io::damage::PartLosses;
 use crate::point::names::{NORMAL, POINT_SOURCE_ID};
 use crate::point::{Dimension, Endian, PointBatch, Schema, Value};
@@ -58,6 +59,8 @@ pub(super) struct E57Part<'a> {
     read: u64,
     losses: PartLosses,
     is_over: bool,
+    /// What the others lie in, in coordinates of the scan.
+    seen: Option<[[f64; 3]; 2]>,
 }
 
 impl<'a> E57Part<'a> {
@@ -118,6 +121,7 @@ impl<'a> E57Part<'a> {
             read: 0,
             losses: file.losses.part(),
             is_over: false,
+            seen: None,
         })
     }
 
@@ -162,7 +166,7 @@ impl<'a> E57Part<'a> {
     }
 
     /// Makes a record of a point; false if it has no coordinates.
-    fn point(&self, values: &[RecordValue], record: &mut [u8]) -> Result<bool> {
+    fn point(&mut self, values: &[RecordValue], record: &mut [u8]) -> Result<bool> {
         let (mut own, mut polar, mut normal) = ([None; 3], [None; 3], [0.0; 3]);
         let mut lacks = false;
         let mut is_valid = [true; 2];
@@ -193,6 +197,9 @@ impl<'a> E57Part<'a> {
         if own.iter().any(|v| v.is_nan()) {
             return Ok(false);
         }
+        let [low, high] = self.seen.unwrap_or([own; 2]);
+        let each = |of: fn(f64, f64) -> f64, ends: [f64; 3]| [0, 1, 2].map(|i| of(ends[i], own[i]));
+        self.seen = Some([each(f64::min, low), each(f64::max, high)]);
         let (own, normal) = match &self.scan.pose {
             Some(pose) => (pose.placed(own), pose.turned(normal)),
             None => (own, normal),
@@ -262,6 +269,9 @@ fn from_polar([range, azimuth, elevation]: [f64; 3]) -> [f64; 3] {
 impl Part for E57Part<'_> {
     fn read(&mut self, batch: &mut PointBatch) -> Result<()> {
         let outcome = self.fill(batch);
+        if outcome.is_ok() && batch.is_empty() {
+            *lock(&self.scan.seen) = self.seen;
+        }
         self.file.origin.vouch(outcome, batch.is_empty())
     }
 }

@@ -44,14 +44,14 @@ impl Format for E57Format {
     }
 
     fn open(&self, files: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn Source>> {
-        source::open(files, keys)
+        Ok(Box::new(source::open(files, keys)?))
     }
 
     fn describe(&self, path: &Path) -> Result<serde_json::Value> {
         info::describe(path)
     }
 
-    fn validate(&self, path: &Path, walk: &PointWalk, findings: &mut Findings) -> Result<()> {
+    fn validate(&self, path: &Path, walk: &PointWalk<'_>, findings: &mut Findings) -> Result<()> {
         validate::validate(path, walk, findings)
     }
 

@@ -29,7 +29,7 @@ const SCANS_MOST: usize = u16::MAX as usize;
 ///
 /// A file that is no E57 or damaged, a scan without coordinates, more points than the file could
 /// hold.
-pub(super) fn open(paths: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn Source>> {
+pub(super) fn open(paths: &[PathBuf], keys: &ReadKeys) -> Result<E57Source> {
     let files = paths.iter().map(|path| E57File::open(path, keys.scans.as_deref(), keys.on_error));
     let files = files.collect::<Result<Vec<_>>>()?;
     let Some(first) = files.first() else {
@@ -52,7 +52,7 @@ pub(super) fn open(paths: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn Source>
     warnings.extend(told);
     let units = crs.as_deref().map(crate::io::wkt::units).unwrap_or_default();
     let metadata = Metadata { crs, units, ..Metadata::default() };
-    Ok(Box::new(E57Source { schema: Arc::new(schema), metadata, files, places, warnings }))
+    Ok(E57Source { schema: Arc::new(schema), metadata, files, places, warnings })
 }
 
 /// The dimensions and types of a scan's values, coordinates left out.
@@ -111,10 +111,10 @@ fn schema(scans: &[&E57Scan]) -> (Schema, Vec<String>) {
 }
 
 /// The points of the scans of one or several E57 files.
-struct E57Source {
+pub(super) struct E57Source {
     schema: Arc<Schema>,
     metadata: Metadata,
-    files: Vec<E57File>,
+    pub files: Vec<E57File>,
     /// File and scan of each part.
     places: Vec<(usize, usize)>,
     warnings: Vec<String>,

@@ -7,10 +7,10 @@ use std::path::Path;
 
 use e57::PointCloud;
 
-use super::file::reader;
+use super::file::{E57Scan, reader};
 use super::names::{CALLED, MAGIC};
 use super::source;
-use crate::host::Threads;
+use crate::host::{Threads, lock};
 use crate::io::origin::Origin;
 use crate::stage::{Findings, PointWalk, ReadKeys, Rule, WHOLE_RULES, foreign, read_whole};
 use crate::{Error, Result};
@@ -20,6 +20,8 @@ const PAGE: u64 = 1024;
 const CHECKSUM: usize = 4;
 /// Bytes of the header.
 const HEADER: usize = 48;
+/// What the axes are called.
+const AXES: [&str; 3] = ["x", "y", "z"];
 /// Pages that are checked as one item.
 const PAGES: u64 = 4096;
 
@@ -47,17 +49,22 @@ static BOUNDS: Rule = Rule::fault(
     "ASTM E2807, cartesianBounds",
     "finite numbers, no smallest above the largest",
 );
+static BOUNDS_HOLD: Rule = Rule::fault(
+    "e57-bounds-hold",
+    "ASTM E2807, cartesianBounds",
+    "bounds that hold all points of the scan, in its own coordinates",
+);
 static GUID: Rule =
     Rule::warning("e57-guid", "ASTM E2807, Data3D, guid", "an identifier for each scan");
 
 /// All rules for E57 files.
 pub(super) fn rules() -> Vec<&'static Rule> {
-    let own = [&VERSION, &LENGTH, &PAGE_SIZE, &XML, &SUM, &SECTION, &BOUNDS, &GUID];
+    let own = [&VERSION, &LENGTH, &PAGE_SIZE, &XML, &SUM, &SECTION, &BOUNDS, &BOUNDS_HOLD, &GUID];
     own.into_iter().chain(WHOLE_RULES).collect()
 }
 
 /// Checks the file at `path`.
-pub(super) fn validate(path: &Path, walk: &PointWalk, findings: &mut Findings) -> Result<()> {
+pub(super) fn validate(path: &Path, walk: &PointWalk<'_>, findings: &mut Findings) -> Result<()> {
     let (file, origin) = Origin::open(path)?;
     let length = origin.length();
     let mut head = [0; HEADER];
@@ -83,7 +90,9 @@ pub(super) fn validate(path: &Path, walk: &PointWalk, findings: &mut Findings) -
     let scans = opened.pointclouds();
     (1..).zip(&scans).for_each(|(number, scan)| of_scan(number, scan, findings));
     let source = source::open(&[path.to_owned()], &ReadKeys::default())?;
-    read_whole(&*source, walk, findings)
+    read_whole(&source, walk, findings)?;
+    source.files.iter().flat_map(|file| &file.scans).for_each(|scan| of_points(scan, findings));
+    Ok(())
 }
 
 fn header(head: &[u8; HEADER], length: u64, findings: &mut Findings) {
@@ -113,7 +122,7 @@ fn sums(
     path: &Path,
     file: &File,
     length: u64,
-    walk: &PointWalk,
+    walk: &PointWalk<'_>,
     findings: &mut Findings,
 ) -> Result<()> {
     let pages = length / PAGE;
@@ -142,7 +151,7 @@ fn sums(
             item,
             |()| {},
             |(_, wrong)| {
-                crate::host::lock(&all).merge(wrong);
+                lock(&all).merge(wrong);
                 Ok(())
             },
         )
@@ -151,19 +160,37 @@ fn sums(
     Ok(())
 }
 
+/// The axes of a scan's bounds, as far as both ends of one are told.
+fn axes(scan: &PointCloud) -> impl Iterator<Item = (usize, [f64; 2])> {
+    let bounds = scan.cartesian_bounds.as_ref();
+    let axes = bounds.map(|bounds| {
+        [(bounds.x_min, bounds.x_max), (bounds.y_min, bounds.y_max), (bounds.z_min, bounds.z_max)]
+    });
+    let axes = axes.into_iter().flatten().enumerate();
+    axes.filter_map(|(axis, (low, high))| Some((axis, [low?, high?])))
+}
+
+/// Holds the points of a scan that were read to its bounds, but for what single precision rounds.
+fn of_points(scan: &E57Scan, findings: &mut Findings) {
+    let Some([lowest, highest]) = *lock(&scan.seen) else { return };
+    for (axis, [low, high]) in axes(&scan.cloud) {
+        let slack = f64::from(f32::EPSILON) * low.abs().max(high.abs());
+        let (least, most) = (lowest[axis], highest[axis]);
+        if low <= high && (least < low - slack || most > high + slack) {
+            let (name, number) = (AXES[axis], scan.number);
+            let told = format!("{name} of points from {least} to {most}, and the bounds of scan ");
+            findings.whole(&BOUNDS_HOLD, format!("{told}{number} are {low} to {high}"));
+        }
+    }
+}
+
 fn of_scan(number: u64, scan: &PointCloud, findings: &mut Findings) {
     if scan.guid.as_ref().is_none_or(String::is_empty) {
         findings.whole(&GUID, format!("scan {number} has none"));
     }
-    let Some(bounds) = &scan.cartesian_bounds else { return };
-    let axes = [
-        ("x", bounds.x_min, bounds.x_max),
-        ("y", bounds.y_min, bounds.y_max),
-        ("z", bounds.z_min, bounds.z_max),
-    ];
-    for (axis, low, high) in axes {
-        let (Some(low), Some(high)) = (low, high) else { continue };
+    for (axis, [low, high]) in axes(scan) {
         if scan.records > 0 && !(low <= high && low.is_finite() && high.is_finite()) {
+            let axis = AXES[axis];
             findings.whole(&BOUNDS, format!("{axis} of scan {number} from {low} to {high}"));
         }
     }

@@ -5,6 +5,7 @@
 //! as `f32` has one, though its digits go on. So the points are read once before the run, and the
 //! most decimals of an axis are its step.
 
+use crate::point::names::XYZ;
 use crate::point::{Dimension, Endian, PointBatch, Scalar};
 use crate::quantity::{Figure, Setting};
 use crate::stage::{PointWalk, Source, WriteKeys};
@@ -105,7 +106,10 @@ impl Spread {
             }
         };
         let failed = |_: &mut Spread, _: usize, error: Error| Err(error);
-        let all = walk.each_batch(source, 0, || Spread::none(axes), look, failed)?;
+        let names = schema.dimensions.iter().map(|dimension| dimension.name.clone());
+        let unread: Vec<String> = names.filter(|name| !XYZ.contains(&name.as_str())).collect();
+        let begin = || Spread::none(axes);
+        let all = walk.each_batch(source, &unread, 0, begin, look, failed)?;
         Ok(all.into_iter().fold(Spread::none(axes), Spread::joined))
     }
 

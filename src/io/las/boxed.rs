@@ -19,17 +19,24 @@ const NEAR: f64 = 1e-3;
 pub struct Wanted {
     bounds: Option<CropBox>,
     resolution: Option<f64>,
+    /// Of how many of how many points levels of an octree are enough.
+    enough: Option<(u64, u64)>,
 }
 
 impl Wanted {
     /// What `keys` want.
     pub fn of(keys: &ReadKeys) -> Wanted {
-        Wanted { bounds: keys.bounds.clone(), resolution: keys.resolution }
+        Wanted { bounds: keys.bounds.clone(), resolution: keys.resolution, enough: None }
+    }
+
+    /// The same, but of octrees no more levels than have `enough` of `all` points.
+    pub fn of_all(self, enough: u64, all: u64) -> Wanted {
+        Wanted { enough: Some((enough, all)), ..self }
     }
 
     /// True if not all points are.
     pub fn is_some(&self) -> bool {
-        self.bounds.is_some() || self.resolution.is_some()
+        self.bounds.is_some() || self.resolution.is_some() || self.enough.is_some()
     }
 
     /// Leaves the chunks of `input` out that have none of the points.
@@ -45,7 +52,7 @@ impl Wanted {
             };
         }
         let file = input.reopen()?;
-        let chunks = select(input, &file, self.bounds.as_ref(), self.resolution)?;
+        let chunks = select(input, &file, self.bounds.as_ref(), (self.resolution, self.enough))?;
         if let Storage::Laz(_, known) = &mut input.storage {
             *known = Chunks::Known(chunks);
         }

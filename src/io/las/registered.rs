@@ -86,7 +86,7 @@ impl Format for LasFormat {
         json(&describe::describe(path)?)
     }
 
-    fn validate(&self, path: &Path, walk: &PointWalk, findings: &mut Findings) -> Result<()> {
+    fn validate(&self, path: &Path, walk: &PointWalk<'_>, findings: &mut Findings) -> Result<()> {
         validate::validate(path, self.form == Form::Octree, walk, findings)
     }
 

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::boxed::Wanted;
 use super::chunked::LazPart;
 use super::chunks::{Chunk, Chunks};
+use super::copc::selected::has_octree;
 use super::crs;
 use super::form::OneForm;
 use super::format::{has_gps_time, selection};
@@ -45,12 +46,18 @@ pub(super) fn open_with(paths: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn So
 
 /// As [`open_with`].
 pub fn opened(paths: &[PathBuf], keys: &ReadKeys) -> Result<LasSource> {
+    opened_where(paths, keys, Wanted::of(keys))
+}
+
+/// As [`open_with`], those points that are wanted.
+fn opened_where(paths: &[PathBuf], keys: &ReadKeys, wanted: Wanted) -> Result<LasSource> {
     let Some((first, others)) = paths.split_first() else {
         return Err(Error::pipeline("there is no input file"));
     };
-    let (form, wanted) = (OneForm::of(keys, paths)?, Wanted::of(keys));
-    let open = |path: &PathBuf| {
+    let (form, mut has_levels) = (OneForm::of(keys, paths)?, true);
+    let mut open = |path: &PathBuf| {
         let mut input = LasInput::open(path, form.on_error)?;
+        has_levels &= has_octree(&input);
         wanted.apply(&mut input)?;
         form.bring(input)
     };
@@ -91,7 +98,8 @@ pub fn opened(paths: &[PathBuf], keys: &ReadKeys) -> Result<LasSource> {
     let mut start = 0;
     let parts = files.iter().enumerate().flat_map(|(i, file)| file.parts(i, &mut start)).collect();
     let schema = Arc::new(schema);
-    Ok(LasSource { files, parts, schema, metadata, form, wanted, warnings })
+    let again = has_levels.then(|| keys.clone());
+    Ok(LasSource { files, parts, schema, metadata, form, wanted, again, warnings })
 }
 
 /// LAS and LAZ files opened together.
@@ -102,6 +110,8 @@ pub struct LasSource {
     metadata: Metadata,
     form: OneForm,
     wanted: Wanted,
+    /// How files that all have an octree are opened again, for some of its levels.
+    again: Option<ReadKeys>,
     warnings: Vec<String>,
 }
 
@@ -327,6 +337,15 @@ impl Source for LasSource {
     fn part_without(&self, index: usize, unread: &[String]) -> Result<Box<dyn Part + '_>> {
         let place = &self.parts[index];
         self.files[place.file].open(place, selection(&self.schema, unread), &self.wanted)
+    }
+
+    fn coarser(&self, points: u64) -> Option<Box<dyn Source>> {
+        let keys = self.again.as_ref().filter(|_| points < self.points())?;
+        let paths: Vec<PathBuf> = self.files.iter().map(|file| file.input.path.clone()).collect();
+        let wanted = Wanted::of(keys).of_all(points, self.points());
+        // An octree that cannot be followed is none: the file is read whole.
+        let coarser = opened_where(&paths, keys, wanted).ok()?;
+        (coarser.points() < self.points()).then(|| Box::new(coarser) as Box<dyn Source>)
     }
 
     fn warnings(&self) -> Vec<String> {

@@ -4,7 +4,7 @@
 use crate::stage::Rule;
 
 /// All of them.
-pub static RULES: [&Rule; 15] = [
+pub static RULES: [&Rule; 16] = [
     &INFO,
     &INFO_RESERVED,
     &POINT_FORMAT,
@@ -20,6 +20,7 @@ pub static RULES: [&Rule; 15] = [
     &NODE,
     &NODE_COUNT,
     &NODE_BOX,
+    &SORTED,
 ];
 
 pub static INFO: Rule = Rule::fault(
@@ -87,4 +88,9 @@ pub static NODE_BOX: Rule = Rule::fault(
     "copc-node-box",
     "COPC 1.0, hierarchy VLR, VoxelKey",
     "points inside of the cube of their node",
+);
+pub static SORTED: Rule = Rule::note(
+    "copc-time-order",
+    "COPC 1.0, Implementation",
+    "points of a node in the order of their GPS times, which compress best",
 );

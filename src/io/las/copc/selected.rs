@@ -2,7 +2,9 @@
 //! nodes of its octree that meet the box, on the levels down to the first that is as fine (COPC
 //! 1.0, "info VLR" and "COPC hierarchy VLR").
 
-use super::hierarchy::VoxelKey;
+use std::collections::BTreeMap;
+
+use super::hierarchy::{NodeChunk, VoxelKey};
 use super::names::{HIERARCHY, INFO, INFO_AT, INFO_BYTES, USER};
 use super::nodes;
 use crate::io::las::file::InputFile;
@@ -59,14 +61,14 @@ pub fn has_octree(input: &LasInput) -> bool {
 }
 
 /// The chunks of the nodes of `input`, which has an octree, that meet `bounds`, on the levels down
-/// to `resolution`.
+/// to a `resolution`, and down to the first with which they have `enough` of so many points.
 ///
 /// Fails, with what to do instead, if the octree cannot be followed.
 pub fn select(
     input: &LasInput,
     file: &InputFile,
     bounds: Option<&CropBox>,
-    resolution: Option<f64>,
+    (resolution, enough): (Option<f64>, Option<(u64, u64)>),
 ) -> Result<ChunkList> {
     let broken = |byte: u64, why: &str| {
         file.wrong(byte, format!("the octree of this COPC file cannot be followed: {why}"))
@@ -86,13 +88,16 @@ pub fn select(
     }
     let slack = input.own_header().scale().into_iter().fold(0.0, |a: f64, b| a.max(b.abs()));
     let deepest = resolution.map_or(i32::MAX, |resolution| info.level(resolution));
+    let mut wanted = found;
+    wanted.retain(|(key, _)| {
+        key.level <= deepest && bounds.is_none_or(|bounds| info.meets(*key, bounds, slack))
+    });
+    if let Some(enough) = enough {
+        let deepest = enough_levels(&wanted, enough);
+        wanted.retain(|(key, _)| key.level <= deepest);
+    }
     let mut chunks = ChunkList::default();
-    for (key, chunk) in found {
-        let is_wanted =
-            key.level <= deepest && bounds.is_none_or(|bounds| info.meets(key, bounds, slack));
-        if !is_wanted {
-            continue;
-        }
+    for (_, chunk) in wanted {
         let (bytes, points) = (u64::from(chunk.bytes as u32), u64::from(chunk.points as u32));
         let end = chunk.start.checked_add(bytes).filter(|end| *end <= file.len());
         let end = end.ok_or_else(|| broken(chunk.start, "a node is behind the end of the file"))?;
@@ -103,9 +108,41 @@ pub fn select(
     Ok(chunks.closed())
 }
 
+/// The first level down to which `nodes` have as large a share of their points as `enough` is of
+/// all.
+fn enough_levels(nodes: &[(VoxelKey, NodeChunk)], (enough, of_all): (u64, u64)) -> i32 {
+    let mut levels: BTreeMap<i32, u128> = BTreeMap::new();
+    for (key, chunk) in nodes {
+        *levels.entry(key.level).or_default() += u128::from(chunk.points as u32);
+    }
+    let all: u128 = levels.values().sum();
+    let mut sum = 0;
+    for (level, points) in levels {
+        sum += points;
+        if sum * u128::from(of_all) >= all * u128::from(enough) {
+            return level;
+        }
+    }
+    i32::MAX
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn levels_are_read_down_to_the_first_that_makes_the_points_enough() {
+        let node = |level, points| {
+            (VoxelKey { level, at: [0; 3] }, NodeChunk { start: 0, bytes: 1, points })
+        };
+        let nodes = [node(2, 60), node(0, 10), node(1, 15), node(1, 15)];
+        for (enough, level) in
+            [(0, 0), (10, 0), (11, 1), (40, 1), (41, 2), (100, 2), (101, i32::MAX)]
+        {
+            assert_eq!(enough_levels(&nodes, (enough, 100)), level, "{enough}");
+            assert_eq!(enough_levels(&nodes, (3 * enough, 300)), level, "of more files: {enough}");
+        }
+    }
 
     #[test]
     fn nodes_that_meet_a_box_and_levels_that_are_coarse() {

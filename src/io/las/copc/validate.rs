@@ -221,6 +221,11 @@ fn no_chunk(key: VoxelKey, node: &NodeChunk, findings: &mut Findings) {
     findings.at(&r::NODE, node.start, told);
 }
 
+/// Enters a point whose time is before that of the point before it in its node.
+pub fn unsorted(findings: &mut Findings, point: u64, [earlier, time]: [f64; 2]) {
+    findings.point(&r::SORTED, point, None, || format!("{time} behind {earlier}"));
+}
+
 /// Enters a point that is not in the box of its node.
 pub fn outside(findings: &mut Findings, node: &NodeBox, point: u64, stored: [i32; 3]) {
     findings.point(&r::NODE_BOX, point, None, || {

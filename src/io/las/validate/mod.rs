@@ -8,6 +8,7 @@ mod raw;
 mod records;
 mod rules;
 mod systems;
+mod usual;
 
 use std::path::Path;
 
@@ -27,6 +28,10 @@ use raw::RawHeader;
 use records::FoundRecord;
 use rules as r;
 
+/// Whose records describe wave packets, and what their indices are added to (LAS 1.4 R15, 3).
+const SPECIFICATION: &str = "LASF_Spec";
+const WAVEFORM_RECORDS: usize = 99;
+
 /// Rules that the reader needs to find records and points.
 static STRUCTURE: [&Rule; 10] = [
     &r::VERSION,
@@ -44,14 +49,14 @@ static STRUCTURE: [&Rule; 10] = [
 /// All rules for LAS and LAZ, and those of COPC besides.
 pub fn rules(has_octree: bool) -> Vec<&'static Rule> {
     let octree = if has_octree { &copc_rules::RULES[..] } else { &[] };
-    rules::RULES.iter().chain(octree).copied().collect()
+    rules::RULES.iter().chain(&usual::USUAL_RULES).chain(octree).copied().collect()
 }
 
 /// Checks the file at `path`; as COPC if `is_octree` or if it says that it is.
 pub fn validate(
     path: &Path,
     is_octree: bool,
-    walk: &PointWalk,
+    walk: &PointWalk<'_>,
     findings: &mut Findings,
 ) -> Result<()> {
     let file = InputFile::open(path)?;
@@ -139,7 +144,7 @@ fn look(
     input: &LasInput,
     source: &LasSource,
     tree: Option<CopcTree>,
-    walk: &PointWalk,
+    walk: &PointWalk<'_>,
     findings: &mut Findings,
 ) -> Result<()> {
     let nodes = tree.as_ref().map(|tree| tree.hold(input, findings)).unwrap_or_default();
@@ -155,6 +160,7 @@ fn look(
     let rules = PointRules::of(&input.header, is_plain, ranges, nodes);
     let states = walk.each_batch(
         source,
+        &[],
         size_of::<PointsSeen>() as u64,
         PointsSeen::default,
         |seen, part, before, batch| {
@@ -172,6 +178,11 @@ fn look(
     for told in source.found_behind() {
         findings.whole(&r::COUNT, told);
     }
+    let is_described = |index: usize| {
+        let number = (WAVEFORM_RECORDS + index) as u16;
+        input.vlrs.iter().any(|vlr| vlr.is(SPECIFICATION, number))
+    };
+    all.usual.tell(&input.header, all.times, is_described, findings);
     if all.has_byte_colors() {
         findings.whole(&r::COLORS, format!("none above {}", all.brightest));
     }

@@ -2,7 +2,8 @@
 
 use super::described::ExtraRange;
 use super::rules as r;
-use crate::io::las::copc::validate::{NodeBox, outside};
+use super::usual::{UsualFields, UsualSeen};
+use crate::io::las::copc::validate::{NodeBox, outside, unsorted};
 use crate::io::las::format::has_gps_time;
 use crate::io::las::header::Header;
 use crate::point::PointBatch;
@@ -20,6 +21,7 @@ pub struct PointRules {
     time: Option<usize>,
     /// The first colour and how many there are.
     colors: Option<(usize, usize)>,
+    usual: UsualFields,
     /// True if times are seconds of a week.
     is_week: bool,
     /// Stored coordinates that the header's box holds.
@@ -40,6 +42,9 @@ pub struct PointsSeen {
     /// The largest colour.
     pub brightest: u16,
     pub points: u64,
+    pub usual: UsualSeen,
+    /// The node, the number and the time of the last point of an octree.
+    last: Option<(usize, u64, f64)>,
 }
 
 impl Default for PointsSeen {
@@ -49,6 +54,8 @@ impl Default for PointsSeen {
             times: [f64::INFINITY, f64::NEG_INFINITY],
             brightest: 0,
             points: 0,
+            usual: UsualSeen::default(),
+            last: None,
         }
     }
 }
@@ -60,6 +67,7 @@ impl PointsSeen {
         self.times = [self.times[0].min(other.times[0]), self.times[1].max(other.times[1])];
         self.brightest = self.brightest.max(other.brightest);
         self.points += other.points;
+        self.usual.merge(&other.usual);
     }
 
     /// True if all colours are of 8 bits, and some are not black.
@@ -98,6 +106,7 @@ impl PointRules {
             is_old,
             time,
             colors,
+            usual: UsualFields::of(format, colors.map(|(at, _)| at)),
             is_week: header.encoding() & 1 == 0,
             held: held(header),
             plain: plain.then_some((start, header.point_data_record_length.into())),
@@ -113,15 +122,20 @@ impl PointRules {
         for (number, record) in (first..).zip(batch.iter()) {
             let byte = self.plain.map(|(start, each)| start + number * each);
             let Some(core) = record.first_chunk::<20>() else { return };
-            self.flags(&mut seen.findings, number, byte, core);
+            let returns = self.flags(&mut seen.findings, number, byte, core);
             let axis =
                 |i: usize| i32::from_le_bytes([core[i], core[i + 1], core[i + 2], core[i + 3]]);
             let stored = [0, 4, 8].map(axis);
+            seen.usual.look(&self.usual, record, stored, returns);
             if let Some(held) = &self.held {
                 in_box(&mut seen.findings, held, number, byte, stored);
             }
             if let Some(time) = self.time.and_then(|at| record.get(at..)?.first_chunk()) {
-                self.time(seen, number, byte, f64::from_le_bytes(*time));
+                let time = f64::from_le_bytes(*time);
+                self.time(seen, number, byte, time);
+                if !self.nodes.is_empty() {
+                    self.order(seen, number, time);
+                }
             }
             if let Some((at, count)) = self.colors {
                 let colors = record.get(at..at + 2 * count).unwrap_or(&[]).as_chunks::<2>().0;
@@ -143,8 +157,14 @@ impl PointRules {
         }
     }
 
-    /// Return numbers, class and scan angle.
-    fn flags(&self, findings: &mut Findings, number: u64, byte: Option<u64>, core: &[u8; 20]) {
+    /// Return numbers, class and scan angle; the number of the return and of how many it is.
+    fn flags(
+        &self,
+        findings: &mut Findings,
+        number: u64,
+        byte: Option<u64>,
+        core: &[u8; 20],
+    ) -> (u8, u8) {
         let at = |field: u64| byte.map(|byte| byte + field);
         let (mask, shift) = if self.is_old { (0b111, 3) } else { (0b1111, 4) };
         let (returned, of) = (core[14] & mask, core[14] >> shift & mask);
@@ -169,6 +189,19 @@ impl PointRules {
         if angle.abs() > most {
             findings.point(&r::ANGLE, number, at(field), || format!("{} degrees", Short(angle)));
         }
+        (returned, of)
+    }
+
+    /// The order of times within a node of an octree.
+    fn order(&self, seen: &mut PointsSeen, number: u64, time: f64) {
+        let node = self.nodes.partition_point(|node| node.first <= number);
+        if let Some((before, last, earlier)) = seen.last
+            && (before, last + 1) == (node, number)
+            && time < earlier
+        {
+            unsorted(&mut seen.findings, number, [earlier, time]);
+        }
+        seen.last = Some((node, number, time));
     }
 
     fn time(&self, seen: &mut PointsSeen, number: u64, byte: Option<u64>, time: f64) {
