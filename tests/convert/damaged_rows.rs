@@ -128,7 +128,7 @@ fn lines_that_are_no_points_are_left_out_and_told_by_their_bytes() {
 fn more_lines_that_are_wrong_than_are_held_are_counted_all_the_same() {
     let at = tempfile::tempdir().unwrap();
     let at = at.path();
-    let line = |n: u32| if n % 3 == 0 { format!("{n} 2 3\n") } else { "?\n".to_owned() };
+    let line = |n: u32| if n.is_multiple_of(3) { format!("{n} 2 3\n") } else { "?\n".to_owned() };
     fs::write(at.join("a.xyz"), (0..3_000).map(line).collect::<String>()).unwrap();
     let (told, records, lost) = run(at, "a.xyz", "salvage");
     assert!(told.contains("2,000 points are lost"), "{told}");
