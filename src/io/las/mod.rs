@@ -19,6 +19,7 @@ mod fields;
 mod file;
 mod form;
 pub(crate) mod format;
+mod geokeys;
 mod guard;
 mod header;
 pub(crate) mod holding;
