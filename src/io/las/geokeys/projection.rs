@@ -26,7 +26,7 @@ impl GeoKeys {
         }
         let base = epsg::wkt(self.code(GEODETIC)?.into(), None)?;
         let base = base.starts_with("GEOGCS").then_some(base)?;
-        let unit = epsg::unit_text(self.value(LINEAR_UNITS).unwrap_or(9001).into())?;
+        let unit = epsg::unit_text(self.value(LINEAR_UNITS)?.into())?;
         let mut text = format!("PROJCS[\"unnamed\",{base},");
         let (method, parameters) = self.projection(vlrs)?;
         text += &format!("PROJECTION[\"{method}\"],");
@@ -126,7 +126,7 @@ fn utm(code: u16) -> Option<(&'static str, Vec<(&'static str, f64)>)> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{GEO_DOUBLES, GEO_KEYS, USER, text};
+    use super::super::{GEO_DOUBLES, GEO_KEYS, USER, text as named};
     use super::*;
     use crate::point::Units;
 
@@ -186,22 +186,26 @@ mod tests {
         assert!(text.starts_with("PROJCS[\"unnamed\",GEOGCS[\"NAD83\""), "{text}");
         assert!(text.contains("PARAMETER[\"central_meridian\",-100.5]"), "{text}");
         assert!(wkt::units(&text).are(&of(&mercator)), "{text}");
-        assert_eq!(text(&mercator), Some(text), "it is what other formats get");
+        assert_eq!(named(&mercator), Some(text), "it is what other formats get");
         let cone = [(3078, 30.1), (3079, 31.9), (3084, -100.5), (3085, 29.5), (3086, 7e5)];
-        let text = wkt_of(&described(&[&own[..], &[3075, 8]].concat(), &cone)).unwrap();
+        let text = wkt_of(&described(&[&own[..], &[3075, 8, 3076, 9001]].concat(), &cone)).unwrap();
         assert!(text.contains("Lambert_Conformal_Conic_2SP") && text.contains("_2\",31.9]"));
-        let zone = described(&[1024, 1, 2048, 4269, 3072, 32767, 3074, 16015], &[]);
+        let zone = described(&[1024, 1, 2048, 4269, 3072, 32767, 3074, 16015, 3076, 9001], &[]);
         let text = wkt_of(&zone).unwrap();
         assert!(text.contains("central_meridian\",-93]") && text.contains("0.9996"), "{text}");
-        // A number that is missing, another method, another unit of angles, a datum of its own.
+        // A number or the unit that is missing, another method, another unit of angles or datum.
         for (words, numbers) in [
-            (&[&own[..], &[3075, 1]].concat(), &numbers[..1]),
-            (&[&own[..], &[3075, 15]].concat(), &numbers[..]),
-            (&vec![1024, 1, 2048, 4269, 2054, 9105, 3072, 32767, 3075, 1], &numbers[..]),
-            (&vec![1024, 1, 2048, 32767, 3072, 32767, 3075, 1], &numbers[..]),
+            (&[&own[..], &[3075, 1, 3076, 9001]].concat(), &numbers[..1]),
+            (&[&own[..], &[3075, 15, 3076, 9001]].concat(), &numbers[..]),
+            (&[&own[..], &[3075, 1]].concat(), &numbers[..]),
+            (
+                &vec![1024, 1, 2048, 4269, 2054, 9105, 3072, 32767, 3075, 1, 3076, 9001],
+                &numbers[..],
+            ),
+            (&vec![1024, 1, 2048, 32767, 3072, 32767, 3075, 1, 3076, 9001], &numbers[..]),
         ] {
             let vlrs = described(words, numbers);
-            assert_eq!((wkt_of(&vlrs), text(&vlrs)), (None, None), "{words:?}");
+            assert_eq!((wkt_of(&vlrs), named(&vlrs)), (None, None), "{words:?}");
         }
     }
 }
