@@ -1,11 +1,14 @@
-//! The units of coordinate reference systems by their EPSG codes. The table has the kind and the
-//! unit of each and nothing else of them: where a system is, nobody here asks.
+//! The units of coordinate reference systems by their EPSG codes, and the systems themselves, where
+//! WKT 1 has words for them. The table of units has the kind and the unit of every code.
+
+mod definitions;
 
 use crate::point::{Horizontal, Units};
+pub use definitions::{datum_of, datums, heights, parts, plain, unit_text, vertical_text, wkt};
 
 /// A line holds a kind of system, metres in a unit of its lengths, and codes: single ones and
 /// ranges.
-const TABLE: &str = include_str!("epsg_units.txt");
+const TABLE: &str = include_str!("epsg/units.txt");
 
 /// Metres in an international foot.
 const FOOT: f64 = 0.3048;

@@ -10,6 +10,7 @@ pub(crate) mod ends;
 mod epsg;
 mod facets;
 pub mod las;
+mod meaning;
 mod origin;
 pub mod pcd;
 pub mod ply;

@@ -3,6 +3,7 @@
 
 use std::path::Path;
 
+use super::meaning::SystemMeaning;
 use super::{epsg, wkt};
 use crate::error::shown;
 use crate::point::Metadata;
@@ -28,6 +29,12 @@ pub fn checked(text: &str) -> std::result::Result<String, String> {
     let Some((across, up)) = wkt::codes(&text) else {
         return Err(format!("`{text}` has no number where its code should be"));
     };
+    let is_3d = up.is_some() && epsg::horizontal(across).vertical.is_some();
+    if is_3d {
+        return Err(format!(
+            "EPSG:{across} has heights of its own, and there is room for no other"
+        ));
+    }
     if epsg::horizontal(across).horizontal_unknown {
         return Err(format!(
             "EPSG:{across} is no projected, geographic or geocentric system that \
@@ -40,17 +47,30 @@ pub fn checked(text: &str) -> std::result::Result<String, String> {
     }
 }
 
-/// True if both texts mean one system: the same text, WKT of one wording, or the same EPSG codes
-/// with the same units.
+/// True if both texts mean one system: the same text, WKT of one wording or the same EPSG codes
+/// with the same units, or texts that say the same of all that makes a system.
 pub fn are_same(one: &str, two: &str) -> bool {
-    one == two || are_alike(one, two) && wkt::units(one) == wkt::units(two)
+    one == two || are_alike(one, two) && wkt::units(one).are(&wkt::units(two)) || mean_one(one, two)
 }
 
-/// True if both texts are WKT of one wording, or have the same EPSG codes; what units they name may
-/// differ.
+/// True if both texts are WKT of one wording, or have the same EPSG codes and no numbers that
+/// contradict each other; what units they name may differ.
 pub fn are_alike(one: &str, two: &str) -> bool {
     let codes = wkt::codes(one);
-    wkt::alike(one, two) || codes.is_some() && codes == wkt::codes(two)
+    if wkt::alike(one, two) {
+        return true;
+    }
+    let contradict = || {
+        let [one, two] = [one, two].map(SystemMeaning::said);
+        one.is_some_and(|one| two.is_some_and(|two| one.contradicts(&two)))
+    };
+    codes.is_some() && codes == wkt::codes(two) && !contradict()
+}
+
+/// True if both texts say the same of datum, projection, units and heights.
+pub fn mean_one(one: &str, two: &str) -> bool {
+    let [one, two] = [one, two].map(SystemMeaning::of);
+    one.is_some_and(|one| two.is_some_and(|two| one.is(&two)))
 }
 
 /// The system of all inputs: what `keys` say, else what those that name one agree on. Of several

@@ -1,13 +1,14 @@
 //! The units that a coordinate reference system names, in well-known text (WKT 1: OGC 01-009; WKT
 //! 2: OGC 18-010) or by its EPSG code. Knows no files.
 
+pub mod tree;
+
 use super::epsg;
 use crate::point::{Horizontal, Units};
-
-/// A text with brackets nested deeper is none of a coordinate reference system.
-const DEEPEST: usize = 64;
-/// Brackets that are looked into; a system has some hundreds.
-const MOST_NODES: usize = 20_000;
+use tree::{
+    BOUND, COMPOUND, GEODETIC, LENGTH, LOCAL, PROJECTED, SYSTEMS, VERTICAL, WktNode, factor,
+    length_unit, parse, parts,
+};
 
 /// The units of the system that `text` is: WKT, or `EPSG:code` with a vertical code behind `+`. Of
 /// another text, nothing is known.
@@ -28,7 +29,10 @@ fn codes_of(text: &str) -> Option<(Option<u32>, Option<Option<u32>>)> {
     let number = |code: &str| code.trim().parse::<u32>().ok();
     Some(match codes.split_once('+') {
         Some((across, up)) => (number(across), Some(number(up))),
-        None => (number(codes), None),
+        None => match number(codes).and_then(epsg::parts) {
+            Some((across, up)) => (Some(across), Some(Some(up))),
+            None => (number(codes), None),
+        },
     })
 }
 
@@ -52,19 +56,6 @@ fn codes_of_parts(trees: &[WktNode]) -> Option<(u32, Option<u32>)> {
         }
     }
     Some((across?, up))
-}
-
-/// The single systems of `trees`: those of compounds for each.
-fn parts(trees: &[WktNode]) -> Vec<&WktNode> {
-    let mut all = Vec::new();
-    for tree in trees {
-        match tree.is(&COMPOUND) {
-            // Beside the parts there are identifiers and remarks.
-            true => all.extend(tree.inner.iter().filter(|node| SYSTEMS.iter().any(|w| node.is(w)))),
-            false => all.push(tree),
-        }
-    }
-    all
 }
 
 /// True if both texts are WKT of one wording: spaces, the case of keywords, and how numbers are
@@ -93,102 +84,6 @@ pub fn is_second(text: &str) -> bool {
     word.trim_end().to_ascii_uppercase().ends_with("CRS")
 }
 
-/// `WORD["text", number, WORD[…], …]`.
-#[derive(Debug, Default)]
-struct WktNode {
-    word: String,
-    /// Texts and numbers inside, as written, quotes off.
-    values: Vec<String>,
-    inner: Vec<WktNode>,
-}
-
-impl WktNode {
-    fn is(&self, words: &[&str]) -> bool {
-        words.iter().any(|word| self.word.eq_ignore_ascii_case(word))
-    }
-
-    fn find(&self, words: &[&str]) -> Option<&WktNode> {
-        self.inner.iter().find(|node| node.is(words))
-    }
-
-    /// Its own EPSG code.
-    fn epsg(&self) -> Option<u32> {
-        let [authority, code, ..] = &self.find(&["AUTHORITY", "ID"])?.values[..] else {
-            return None;
-        };
-        if authority.eq_ignore_ascii_case("EPSG") { code.parse().ok() } else { None }
-    }
-
-    fn is_like(&self, other: &WktNode) -> bool {
-        let number = |text: &str| text.parse::<f64>().ok();
-        let same = |(one, two): (&String, &String)| {
-            one == two || number(one).is_some_and(|one| number(two) == Some(one))
-        };
-        self.is(&[&other.word])
-            && (self.values.len(), self.inner.len()) == (other.values.len(), other.inner.len())
-            && self.values.iter().zip(&other.values).all(same)
-            && self.inner.iter().zip(&other.inner).all(|(one, two)| one.is_like(two))
-    }
-}
-
-/// The outermost nodes of `text`, mostly one: some writers put the system of z behind that of x and
-/// y. None if a bracket is left open, or there is something outside of them.
-fn parse(text: &str) -> Option<Vec<WktNode>> {
-    let (mut trees, mut open) = (Vec::new(), Vec::<WktNode>::new());
-    let mut word = String::new();
-    let mut nodes = 0;
-    let mut letters = text.chars().peekable();
-    while let Some(letter) = letters.next() {
-        match letter {
-            '[' | '(' => {
-                nodes += 1;
-                if open.len() == DEEPEST || nodes > MOST_NODES {
-                    return None;
-                }
-                let word = std::mem::take(&mut word);
-                open.push(WktNode { word: word.trim().to_owned(), ..WktNode::default() });
-            }
-            // Some writers close a compound before its second part, and once more behind it.
-            ',' | ']' | ')' if open.is_empty() && word.trim().is_empty() => word.clear(),
-            ']' | ')' | ',' => {
-                let node = open.last_mut()?;
-                let value = std::mem::take(&mut word);
-                if !value.trim().is_empty() {
-                    node.values.push(value.trim().to_owned());
-                }
-                if letter != ',' {
-                    let done = open.pop()?;
-                    match open.last_mut() {
-                        Some(outer) => outer.inner.push(done),
-                        None => trees.push(done),
-                    }
-                }
-            }
-            '"' => {
-                // A doubled quote is one inside the text.
-                while let Some(letter) = letters.next() {
-                    if letter == '"' && letters.next_if_eq(&'"').is_none() {
-                        break;
-                    }
-                    word.push(letter);
-                }
-            }
-            _ => word.push(letter),
-        }
-    }
-    (open.is_empty() && word.trim().is_empty() && !trees.is_empty()).then_some(trees)
-}
-
-const COMPOUND: [&str; 2] = ["COMPD_CS", "COMPOUNDCRS"];
-const VERTICAL: [&str; 4] = ["VERT_CS", "VERTCS", "VERTCRS", "VERTICALCRS"];
-const PROJECTED: [&str; 3] = ["PROJCS", "PROJCRS", "PROJECTEDCRS"];
-const GEODETIC: [&str; 5] = ["GEOGCS", "GEOGCRS", "GEOGRAPHICCRS", "GEODCRS", "GEODETICCRS"];
-const LOCAL: [&str; 4] = ["GEOCCS", "LOCAL_CS", "ENGCRS", "ENGINEERINGCRS"];
-const BOUND: [&str; 1] = ["BOUNDCRS"];
-/// All that are no compounds.
-const SYSTEMS: [&[&str]; 5] = [&VERTICAL, &PROJECTED, &GEODETIC, &LOCAL, &BOUND];
-const LENGTH: [&str; 2] = ["LENGTHUNIT", "UNIT"];
-
 /// The units of a system that is given in parts: what the first says that says something.
 fn of_parts<'a>(parts: impl IntoIterator<Item = &'a WktNode>) -> Units {
     parts.into_iter().map(of_system).fold(Units::default(), Units::or)
@@ -205,7 +100,7 @@ fn of_system(node: &WktNode) -> Units {
         return of_parts(parts(source));
     }
     if node.is(&VERTICAL) {
-        return of_vertical(match unit(node) {
+        return of_vertical(match length_unit(node) {
             Some(unit) => factor(unit),
             None => node.epsg().and_then(epsg::vertical),
         });
@@ -229,7 +124,7 @@ fn of_horizontal(node: &WktNode) -> Units {
     if ![&PROJECTED[..], &GEODETIC, &LOCAL].iter().any(|words| node.is(words)) {
         return unknown;
     }
-    let across = match unit(node) {
+    let across = match length_unit(node) {
         Some(unit) => factor(unit).map_or(unknown, |metres| of(Horizontal::Metres(metres))),
         None => epsg::horizontal(node.epsg().unwrap_or(0)),
     };
@@ -242,24 +137,10 @@ fn of_horizontal(node: &WktNode) -> Units {
     }
 }
 
-/// The unit of length of `node`, or of its first axis.
-fn unit(node: &WktNode) -> Option<&WktNode> {
-    node.find(&LENGTH).or_else(|| node.find(&["AXIS"]).and_then(|axis| axis.find(&LENGTH)))
-}
-
 /// Metres in the unit of the third of three axes, where each has its own.
 fn third_axis(node: &WktNode) -> Option<f64> {
     let axis = node.inner.iter().filter(|inner| inner.is(&["AXIS"])).nth(2)?;
     factor(axis.find(&LENGTH)?)
-}
-
-/// Metres in a unit; None for what cannot be, such as a foot of one metre, which some writers name.
-fn factor(unit: &WktNode) -> Option<f64> {
-    let factor: f64 = unit.values.get(1)?.parse().ok()?;
-    let name = unit.values.first()?.to_ascii_lowercase();
-    let foot = ["foot", "feet", "ft"].iter().any(|word| name.contains(word));
-    let possible = factor.is_finite() && factor > 0.0 && (!foot || (0.29..0.32).contains(&factor));
-    possible.then_some(factor)
 }
 
 #[cfg(test)]

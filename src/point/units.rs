@@ -38,7 +38,25 @@ pub struct Mismatch {
 /// apart, a millimetre in a tower of 500 m.
 const ALIKE: f64 = 1e-4;
 
+/// Relative difference of units that texts write with more or fewer digits.
+const DIGITS: f64 = 1e-9;
+
 impl Units {
+    /// True if both are the same, but for the digits that they were written with.
+    pub(crate) fn are(&self, other: &Units) -> bool {
+        let near = |one: f64, two: f64| (one - two).abs() <= DIGITS * one.abs().max(two.abs());
+        let across = match (self.horizontal, other.horizontal) {
+            (Some(Horizontal::Metres(one)), Some(Horizontal::Metres(two))) => near(one, two),
+            (one, two) => one == two,
+        };
+        let up = match (self.vertical, other.vertical) {
+            (Some(one), Some(two)) => near(one, two),
+            (one, two) => one == two,
+        };
+        let unknown = |units: &Units| (units.horizontal_unknown, units.vertical_unknown);
+        across && up && unknown(self) == unknown(other)
+    }
+
     /// Why a distance across x, y and z means nothing; None where the units agree or are not known.
     ///
     /// ```

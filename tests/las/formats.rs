@@ -170,7 +170,8 @@ fn wkt_is_carried_and_another_crs_is_told() {
     let schema = Arc::new(layout(7, &[], [0.01; 3], [0.0; 3]));
     let cases = [
         ("PROJCS[\"Lambert-93\"]", true, None),
-        ("EPSG:2154", true, Some("asks for WKT")),
+        ("EPSG:2154", true, None),
+        ("EPSG:4979", true, Some("asks for WKT")),
         ("a field of ours", false, Some("not carried")),
     ];
     for (crs, carried, told) in cases {

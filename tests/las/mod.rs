@@ -6,4 +6,5 @@ mod holes;
 mod merge;
 mod metadata;
 mod scans;
+mod systems;
 mod verify;

@@ -1,11 +1,12 @@
 //! What an output says of itself and not of its points: in which system it is, what its times
 //! count, what made it of what.
 
-use super::crs;
+use super::crs::{self, GEO_ASCII, GEO_DOUBLES, GEO_KEYS, USER};
 use super::described::{Described, describe};
 use super::extra::Descriptor;
 use super::fields::encoding;
 use super::format::{has_gps_time, record_size};
+use super::geokeys::GeoKeys;
 use super::header::Header;
 use super::native::Native;
 use super::text::{field, split_at_room};
@@ -19,33 +20,57 @@ const PIPELINE: (&str, u16) = ("pointmill", 1);
 /// What the generating software is.
 const SOFTWARE: &str = concat!("pointmill ", env!("CARGO_PKG_VERSION"));
 
-/// Has the header say rightly of what kind the records of the reference system are; notes what is
-/// not carried of it, or not as the point format wants it.
+/// Has the records name the reference system as the point format wants it, and the header say of
+/// what kind they are; notes what is not carried of it, or not in that form.
 pub fn name_system(
     native: &mut Native,
     metadata: &Metadata,
     notes: &mut Vec<String>,
 ) -> Result<()> {
+    if native.header.format() >= 6 {
+        name_by_text(native, notes)?;
+    }
     if crs::wants_bit(&native.header, &native.vlrs, &native.evlrs)? {
         native.header.put_encoding(encoding::WKT, true);
     }
     let Some(text) = &metadata.crs else { return Ok(()) };
     let there = crs::text(&native.vlrs, &native.evlrs)?.is_some();
-    match crs::record(text) {
-        Err(why) if !there => {
-            let (shown, rest) = split_at_room(text, 100);
-            let more = if rest.is_empty() { "" } else { "…" };
-            notes.push(format!("the CRS is not carried: {why}: {shown}{more}"));
-        }
-        Ok(_) if native.made && native.header.format() >= 6 && !wkt::is_wkt(text) => {
-            notes.push(format!(
-                "the CRS {text} is not WKT and is written as GeoTIFF keys: point format {} asks \
-                 for WKT, and some readers will see no CRS",
-                native.header.format()
-            ));
-        }
-        _ => {}
+    if let (Err(why), false) = (crs::record(text), there) {
+        notes.push(format!("the CRS is not carried: {why}: {}", shortened(text)));
     }
+    Ok(())
+}
+
+fn shortened(text: &str) -> String {
+    let (shown, rest) = split_at_room(text, 100);
+    format!("{shown}{}", if rest.is_empty() { "" } else { "…" })
+}
+
+/// Puts WKT in the place of GeoTIFF keys: point formats 6 to 10 must have it (LAS 1.4 R15, section
+/// 3, "Coordinate Reference System Information"). Keys of which no WKT is known stay.
+fn name_by_text(native: &mut Native, notes: &mut Vec<String>) -> Result<()> {
+    if crs::has_wkt(&native.vlrs, &native.evlrs)? {
+        return Ok(());
+    }
+    let Some(text) = crs::text(&native.vlrs, &native.evlrs)? else { return Ok(()) };
+    let made = match GeoKeys::of(&native.vlrs) {
+        Some(keys) => keys.wkt(&native.vlrs),
+        // What libLAS wrote before WKT had a place.
+        None => Some(text.clone()).filter(|text| wkt::is_wkt(text)),
+    };
+    let Some(Ok(record)) = made.map(|text| crs::record(&text)) else {
+        notes.push(format!(
+            "the CRS stays as GeoTIFF keys, of which no WKT is known: {}; point format {} asks \
+             for WKT, and some readers will see no CRS",
+            shortened(&text),
+            native.header.format()
+        ));
+        return Ok(());
+    };
+    let is_keys = |vlr: &Vlr| [GEO_KEYS, GEO_DOUBLES, GEO_ASCII].iter().any(|n| vlr.is(USER, *n));
+    let at = native.vlrs.iter().position(is_keys).unwrap_or(native.vlrs.len());
+    native.vlrs.insert(at, record);
+    native.vlrs.retain(|vlr| !is_keys(vlr));
     Ok(())
 }
 

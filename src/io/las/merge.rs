@@ -81,7 +81,7 @@ impl LasMerge {
         external(inputs)?;
         let mut header = header(inputs);
         header.put_offset(offset);
-        let native = Native { header, vlrs, gap, evlrs, waveforms: None, made: false };
+        let native = Native { header, vlrs, gap, evlrs, waveforms: None };
         Ok((native, shifts))
     }
 }

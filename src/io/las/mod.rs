@@ -21,6 +21,7 @@ mod file;
 mod form;
 pub(crate) mod format;
 mod found;
+mod geokeys;
 mod guard;
 mod header;
 mod held;

@@ -34,8 +34,6 @@ pub struct Native {
     pub evlrs: Vec<Evlr>,
     /// The file that records refer to for their waveforms, beside the input.
     pub waveforms: Option<PathBuf>,
-    /// True if it was made for points that come from no LAS file.
-    pub made: bool,
 }
 
 impl Native {
@@ -48,7 +46,6 @@ impl Native {
             gap: input.gap.clone(),
             evlrs,
             waveforms: input.waveforms.clone(),
-            made: false,
         }
     }
 
@@ -71,7 +68,7 @@ impl Native {
         form.put_crs(&mut vlrs, &mut evlrs);
         let waveforms = Waveforms::of(file.path(), header).there;
         let header = form.header(&now).for_outputs();
-        Ok(Native { header, vlrs, gap, evlrs, waveforms, made: false })
+        Ok(Native { header, vlrs, gap, evlrs, waveforms })
     }
 
     /// True if it belongs to records of this schema.
@@ -113,7 +110,7 @@ impl Native {
         let descriptors: Vec<Descriptor> = extra.map(Descriptor::of).collect();
         let (mut vlrs, mut evlrs) = (record.into_iter().collect(), Vec::new());
         describe(&mut vlrs, &mut evlrs, &descriptors);
-        Native { header, vlrs, gap: Vec::new(), evlrs, waveforms: None, made: true }
+        Native { header, vlrs, gap: Vec::new(), evlrs, waveforms: None }
     }
 }
 

@@ -47,15 +47,16 @@ impl CrsRecords {
         self.vlrs == other.vlrs && self.payloads == other.payloads
     }
 
-    /// True if both say the same: the same bytes, WKT of one wording, or the same EPSG codes; in
-    /// the latter cases with the same units.
+    /// True if both say the same: the same bytes, WKT of one wording or the same EPSG codes with
+    /// the same units, or texts that mean one system.
     pub fn same_system(&self, other: &Self) -> Result<bool> {
         if self.payloads == other.payloads {
             return Ok(true);
         }
         let (Some(one), Some(two)) = (self.text()?, other.text()?) else { return Ok(false) };
         let same = systems::are_alike(&one, &two);
-        Ok(same && units(&self.vlrs, &self.evlrs)? == units(&other.vlrs, &other.evlrs)?)
+        let (own, others) = (units(&self.vlrs, &self.evlrs)?, units(&other.vlrs, &other.evlrs)?);
+        Ok(same && own.are(&others) || systems::mean_one(&one, &two))
     }
 
     /// See [`text`].
