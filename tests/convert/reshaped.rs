@@ -50,7 +50,7 @@ fn dimensions_get_other_names() {
     let taken = ["convert", "a.las", "-o", "b.las", "--map", "amplitude=Intensity"];
     fails(at, &taken, 2, &["the input has `Intensity`, too", "`--drop Intensity`"]);
     for to in ["b.las", "b.laz", "b.ply", "b.csv", "b.pcd", "b.e57"] {
-        let more = ["--map", "amplitude=Intensity,quality=grade", "--drop", "Intensity"];
+        let more = ["--map", "Amplitude=intensity,quality=grade", "--drop", "INTENSITY"];
         let made = converted(at, &more, to);
         assert_eq!(values(&made, "Intensity"), [7.0, 8.0], "{to}");
         assert_eq!(values(&made, "grade"), [0.5, -7.25], "{to}");
@@ -70,7 +70,7 @@ fn dimensions_get_other_names() {
 fn names_that_cannot_be_are_refused() {
     let at = folder();
     for (map, part) in [
-        ("Amplitude=x", "did you mean `amplitude`?"),
+        ("Amplitud=x", "did you mean `amplitude`?"),
         ("X=x", "coordinates keep their names"),
         ("amplitude=Z", "coordinates keep their names"),
         ("amplitude=a,quality=a", "another entry has one of the two names"),
@@ -99,7 +99,7 @@ fn extra_bytes_are_left_out_of_las() {
 fn dimensions_get_other_types() {
     let at = folder();
     let at = at.path();
-    let made = converted(at, &["--type", "X=f32,Intensity=f64,quality=i8"], "b.ply");
+    let made = converted(at, &["--type", "x=f32,Intensity=f64,quality=i8"], "b.ply");
     let (schema, _) = read(&made);
     let scalar = |name: &str| schema.find(name).unwrap().scalar;
     assert_eq!(

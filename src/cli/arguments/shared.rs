@@ -128,7 +128,7 @@ pub(crate) struct WrittenArguments {
     /// the input's, or the smallest that holds what there is]
     #[arg(long, value_name = "N")]
     pub point_format: Option<String>,
-    /// Dimensions that may get lost, such as GpsTime,UserData
+    /// Dimensions that may get lost, such as GpsTime,UserData, whatever their case
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub drop: Vec<String>,
     /// Dimensions that get another name, such as Amplitude=Intensity

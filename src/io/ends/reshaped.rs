@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use crate::error::nearest;
+use crate::io::rows::names::{meant, shared};
 use crate::point::names::XYZ;
 use crate::point::{Dimension, PointBatch, Schema};
 use crate::stage::{Renamed, WriteKeys};
@@ -24,10 +25,18 @@ impl<'a> Reshaped<'a> {
     ///
     /// Names that are not there, and names that two dimensions would have.
     pub fn of(keys: &'a WriteKeys, schema: &'a Arc<Schema>) -> Result<Self> {
-        if keys.map.is_empty() && keys.types.is_empty() {
+        if keys.map.is_empty() && keys.types.is_empty() && keys.drop.is_empty() {
             return Ok(Reshaped { keys: Cow::Borrowed(keys), schema: Cow::Borrowed(schema) });
         }
         let (mut keys, mut named) = (keys.clone(), Schema::clone(schema));
+        let find = |name: &mut String| *name = meant(name, schema).to_owned();
+        keys.drop.iter_mut().for_each(find);
+        for Renamed { from, to } in &mut keys.map {
+            find(from);
+            if let Some(shared) = shared(to) {
+                shared.clone_into(to);
+            }
+        }
         let map = &keys.map;
         map.iter().try_for_each(|renamed| check_one(renamed, map, &keys.drop, schema))?;
         let is_moved = |name: &str| map.iter().any(|renamed| renamed.from == name);
@@ -38,6 +47,9 @@ impl<'a> Reshaped<'a> {
             if let Some(renamed) = map.iter().find(|renamed| renamed.from == dimension.name) {
                 dimension.name.clone_from(&renamed.to);
             }
+        }
+        for retyped in &mut keys.types {
+            retyped.name = meant(&retyped.name, &named).to_owned();
         }
         let drop = keys.drop.iter().filter(|name| !is_taken(name)).cloned().collect();
         keys.drop = drop;

@@ -1,5 +1,6 @@
 //! The names that formats of rows have for dimensions.
 
+use crate::point::Schema;
 use crate::point::names as n;
 
 /// Dimension, the property it is written as, other spellings that are read as it, and what it is.
@@ -130,6 +131,28 @@ pub(crate) fn heading(word: &str) -> Option<&'static str> {
     found.or_else(other).or_else(|| field_of(&format!("scalar_{}", word.strip_prefix("scalar")?)))
 }
 
+/// The dimension that formats share of which `word` is the name, here or in PLY, whatever its case.
+pub(crate) fn shared(word: &str) -> Option<&'static str> {
+    let is_its = |name: &str| name.eq_ignore_ascii_case(word);
+    TABLE.iter().find(|row| is_its(row.0) || is_its(row.1)).map(|row| row.0)
+}
+
+/// The dimension of `schema` that a user means by `word`: of that name, else of one that differs in
+/// its case, or in the words of PLY, if that is one; else `word`.
+pub(crate) fn meant<'a>(word: &'a str, schema: &'a Schema) -> &'a str {
+    if schema.find(word).is_some() {
+        return word;
+    }
+    if let Some(shared) = shared(word).filter(|shared| schema.find(shared).is_some()) {
+        return shared;
+    }
+    let mut alike = schema.dimensions.iter().filter(|d| d.name.eq_ignore_ascii_case(word));
+    match (alike.next(), alike.next()) {
+        (Some(one), None) => &one.name,
+        _ => word,
+    }
+}
+
 /// What headings of texts call dimensions besides.
 const SHORT: &[(&str, &str)] = &[
     ("i", n::INTENSITY),
@@ -148,6 +171,7 @@ pub(crate) fn property(dimension: &str) -> Option<&'static str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::point::{Dimension, Endian, Layout, Scalar};
 
     #[test]
     fn every_known_dimension_reads_back_from_its_property() {
@@ -155,6 +179,28 @@ mod tests {
             assert_eq!(dimension_of(property), *dimension);
             assert!(spellings.iter().all(|s| dimension_of(s) == *dimension));
         }
+    }
+
+    #[test]
+    fn users_mean_dimensions_whatever_the_case() {
+        let named = ["X", "Intensity", "GpsTime", "Amplitude", "twice", "Twice"];
+        let fields = named.iter().enumerate().map(|(n, name)| Dimension::new(*name, Scalar::U8, n));
+        let layout = Layout::plain("TOY");
+        let dimensions = fields.collect();
+        let schema = Schema { layout, endian: Endian::Little, stride: 6, dimensions };
+        for (word, dimension) in [
+            ("x", "X"),
+            ("INTENSITY", "Intensity"),
+            ("gps_time", "GpsTime"),
+            ("gpstime", "GpsTime"),
+            ("amplitude", "Amplitude"),
+            ("twice", "twice"),
+            ("TWICE", "TWICE"),
+            ("red", "red"),
+        ] {
+            assert_eq!(meant(word, &schema), dimension, "{word}");
+        }
+        assert_eq!((shared("intensity"), shared("time")), (Some("Intensity"), None));
     }
 
     #[test]
