@@ -45,6 +45,8 @@ pub struct Projection {
     stage: &'static str,
     /// Dimensions of the target whose types were asked for.
     typed: Vec<String>,
+    /// See [`AskedValues::unit_intensity`].
+    unit_intensity: bool,
 }
 
 impl Projection {
@@ -107,8 +109,18 @@ impl Projection {
         let (to_endian, to_stride) = (to.endian, to.stride);
         let blank = vec![0; to_stride];
         let (from, stage) = (from.clone(), "write");
-        let typed = asked.typed.clone();
-        Ok(Projection { from, to_endian, to_stride, moves, blank, columns, stage, typed })
+        let (typed, unit_intensity) = (asked.typed.clone(), asked.unit_intensity);
+        Ok(Projection {
+            from,
+            to_endian,
+            to_stride,
+            moves,
+            blank,
+            columns,
+            stage,
+            typed,
+            unit_intensity,
+        })
     }
 
     /// The same for records that are brought to another form as they are read.
@@ -274,7 +286,8 @@ impl Projection {
             Move::Rounded { from, to } => {
                 let world = from.world(record, endian);
                 let (stored, back) = nearest(to, world);
-                if to.put(target, self.to_endian, stored) {
+                let is_beyond = world.is_finite() && !back.is_finite();
+                if !is_beyond && to.put(target, self.to_endian, stored) {
                     // What the arithmetic of scales and offsets rounds is not the point's place.
                     let largest = world.abs().max(from.origin.abs()).max(to.origin.abs());
                     let rounded = (back - world).abs();
@@ -328,9 +341,10 @@ impl Projection {
                 .map(|axes| axes.map(|axis| axis.world(record, self.from.endian)));
             return error.help(placed(self.stage, world, to, value.as_f64()));
         }
-        let is_fraction = matches!(value, Value::Single(_) | Value::Double(_));
+        let is_float = matches!(value, Value::Single(_) | Value::Double(_));
+        let is_fraction = is_float && (self.unit_intensity || value.as_f64().fract() != 0.0);
         match self.stage {
-            "write" => error.help(kept_otherwise(to, is_fraction)),
+            "write" => error.help(kept_otherwise(to, is_fraction, self.unit_intensity)),
             _ => error.help("give a point format that has room for it, or convert it by itself"),
         }
     }

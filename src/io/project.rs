@@ -97,7 +97,7 @@ impl Sink for Projected {
 
 /// Tells of so many points that values were rounded `to` something, by so much at most.
 pub(super) fn rounded((points, largest): (u64, f64), to: &str) -> Option<String> {
-    let of = if to == TYPES { "values" } else { "the coordinates" };
+    let of = if to.starts_with(TYPES) { "values" } else { "the coordinates" };
     let points = match points {
         0 => return None,
         1 => "1 point".to_owned(),

@@ -93,6 +93,8 @@ fn las_stays_as_it_is_by_auto() {
     let convert = ["convert", "a.laz", "--quiet", "--no-provenance", "-o"];
     done(at, &[&convert[..], &["b.laz"], &auto].concat());
     done(at, &[&convert[..], &["c.laz"]].concat());
+    let uneven = ["convert", "a.laz", "-o", "d.laz", "--scale", "auto", "--offset", "0.00001,0,0"];
+    fails(at, &uneven, 2, &["no whole number of steps from the offset of the input"]);
     assert_eq!(std::fs::read(at.join("b.laz")).unwrap(), std::fs::read(at.join("c.laz")).unwrap());
 }
 
@@ -134,6 +136,13 @@ fn extra_bytes_that_a_file_lacks_are_nothing_there() {
     let at = at.path();
     let scale = ["--scale", "0.01"];
     las(at, "a.las", "X,Y,Z,zeta,alpha\n1,2,3,7,0.5\n", &scale);
+    // The value for no data is a double in the description, whatever the type.
+    las(at, "f.las", "X,Y,Z,gamma\n1,2,3,0.5\n", &["--scale", "0.01", "--type", "gamma=f32"]);
+    no_data(&at.join("f.las"), 0, (-9999.9f64).to_bits());
+    done(at, &["convert", "a.las", "f.las", "-o", "g.las", "--quiet", "--assume", "extra-bytes"]);
+    let (schema, records) = read(&at.join("g.las"));
+    let gamma = schema.find("gamma").unwrap().world(&records, schema.endian);
+    assert_eq!(gamma as f32, -9999.9_f32);
     las(at, "b.las", "X,Y,Z,alpha,beta\n4,5,6,1.5,9\n", &scale);
     las(at, "c.las", "X,Y,Z\n7,8,9\n", &scale);
     no_data(&at.join("b.las"), 1, 200);

@@ -134,6 +134,51 @@ fn dimensions_get_other_types() {
 }
 
 #[test]
+fn whole_numbers_are_never_rounded_by_a_type() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    let text = "X,Y,Z,stamp\n1,2,3,1700000000123456789\n4,5,6,1700000000123456790\n";
+    std::fs::write(at.join("a.csv"), text).unwrap();
+    let convert = ["convert", "a.csv", "-o", "a.las", "--scale", "1", "--quiet"];
+    done(at, &[&convert[..], &["--type", "stamp=u64"]].concat());
+    let back = ["convert", "a.las", "-o", "b.csv", "--quiet", "--type", "stamp=i64"];
+    done(at, &back);
+    let back = std::fs::read_to_string(at.join("b.csv")).unwrap();
+    assert!(back.contains("1700000000123456789") && back.contains("1700000000123456790"), "{back}");
+    let float = ["convert", "a.las", "-o", "b.ply", "--type", "stamp=f64"];
+    fails(at, &float, 1, &["stamp = 1700000000123456789", "does not fit a 64-bit float"]);
+}
+
+#[test]
+fn what_a_type_does_not_reach_is_refused() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    std::fs::write(at.join("a.csv"), "X,Y,Z,foo\n1,2,3,1e300\n4,5,6,0.5\n").unwrap();
+    for to in ["b.ply", "b.las"] {
+        let convert = ["convert", "a.csv", "-o", to, "--type", "foo=f32"];
+        let scale = if to == "b.las" { &["--scale", "1"][..] } else { &[] };
+        fails(at, &[&convert[..], scale].concat(), 1, &["does not fit a 32-bit float", "--type"]);
+    }
+}
+
+#[test]
+fn keys_that_would_say_two_things_of_one_dimension_are_refused() {
+    let at = folder();
+    let at = at.path();
+    let colors = ["convert", "a.las", "-o", "b.ply", "--type", "Red=u16", "--colors", "8bit"];
+    fails(at, &colors, 2, &["`--type` has `Red=u16`, and `--colors`"]);
+    std::fs::write(
+        at.join("normals.toml"),
+        "stage = [{kind = 'read', path = 'a.las'}, {kind = 'normals'}, {kind = 'write', path = \
+         'b.ply', map = ['quality=NormalX'], dimensions = ['NormalX', 'NormalY', 'NormalZ']}]",
+    )
+    .unwrap();
+    fails(at, &["run", "normals.toml"], 2, &["`write.dimensions` computes `NormalX`"]);
+    let no = ["convert", "a.las", "-o", "b.ply", "--map", "quality=Foo", "--drop", "Foo"];
+    fails(at, &no, 2, &["`--drop` names `Foo`, which the input does not have"]);
+}
+
+#[test]
 fn fractions_are_parts_of_the_most() {
     let at = tempfile::tempdir().unwrap();
     let at = at.path();
@@ -162,5 +207,8 @@ fn fractions_are_parts_of_the_most() {
     assert_eq!(values(&at.join("c.ply"), "Red"), [0.0, 1.0]);
     std::fs::write(at.join("a.ply"), format!("{header}1 2 3 0 0 200 1\n1 2 3 0 0 0 0\n")).unwrap();
     let told = ["colours of floating-point numbers go from 0 to 1", "Green = 200"];
+    fails(at, &[&convert[..], &["--intensity", "unit"]].concat(), 1, &told);
+    std::fs::write(at.join("a.ply"), format!("{header}1 2 3 1.2 0 0 1\n1 2 3 0 0 0 0\n")).unwrap();
+    let told = ["with `--intensity unit` intensities go from 0 to 1", "Intensity = 1.2"];
     fails(at, &[&convert[..], &["--intensity", "unit"]].concat(), 1, &told);
 }

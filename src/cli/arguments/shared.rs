@@ -134,8 +134,8 @@ pub(crate) struct WrittenArguments {
     /// Dimensions that get another name, such as Amplitude=Intensity
     #[arg(long, value_name = "OLD=NEW", value_delimiter = ',')]
     pub map: Vec<String>,
-    /// Types of dimensions in the output, to which values are rounded, such as X=f32: u8 to u64, i8
-    /// to i64, f32, f64
+    /// Types of dimensions in the output, to which values are rounded, such as Amplitude=f32: u8 to
+    /// u64, i8 to i64, f32, f64
     #[arg(long = "type", value_name = "NAME=TYPE", value_delimiter = ',')]
     pub types: Vec<String>,
     /// What intensities with fractions are in LAS: unit, parts of 65535 [default: refused]

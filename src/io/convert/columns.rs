@@ -243,6 +243,7 @@ impl Number {
             let world = *value * from.scale + from.origin;
             let (stored, fits) = to_stored((world - to.origin) / to.scale);
             let back = stored * to.scale + to.origin;
+            let is_beyond = world.is_finite() & !back.is_finite();
             let by = (back - world).abs();
             // What the arithmetic of scales and offsets rounds is not the point's place.
             let largest = if world.abs() > origins { world.abs() } else { origins };
@@ -250,7 +251,7 @@ impl Number {
             let told = (by > 4.0 * f64::EPSILON * largest) & (by > *rounded) & !same;
             *rounded = if told { by } else { *rounded };
             *value = stored;
-            unfit |= u64::from(!fits);
+            unfit |= u64::from(!fits | is_beyond);
         }
         unfit == 0
     }

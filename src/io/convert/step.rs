@@ -67,7 +67,10 @@ pub(super) fn asked_step(from: &Dimension, to: &Dimension, is_part: bool) -> Opt
             _ => {}
         }
     }
-    let is_rounded = to.bits.is_none() && (from.scalar, from.scale) != (to.scalar, to.scale);
+    // A whole number is not rounded: what its new type does not hold is refused.
+    let is_whole = !from.scalar.is_float() && from.scale == 1.0 && from.origin == 0.0;
+    let is_other = (from.scalar, from.scale) != (to.scalar, to.scale);
+    let is_rounded = to.bits.is_none() && is_other && !is_whole;
     is_rounded.then(|| Move::Rounded { from: from.clone(), to: to.clone() })
 }
 

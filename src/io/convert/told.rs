@@ -30,12 +30,17 @@ pub(super) fn placed(stage: &str, world: Option<[f64; 3]>, to: &Dimension, value
 }
 
 /// What helps where a value of a dimension does not fit `to`; `is_fraction` for floating-point
-/// numbers.
-pub(super) fn kept_otherwise(to: &Dimension, is_fraction: bool) -> String {
+/// numbers, `is_unit` where intensities are parts.
+pub(super) fn kept_otherwise(to: &Dimension, is_fraction: bool, is_unit: bool) -> String {
     let name = &to.name;
     let dropped = format!("`write.drop = [{name:?}]` leaves the dimension out");
     match name.as_str() {
         _ if !is_fraction || to.scalar.is_float() => dropped,
+        INTENSITY if is_unit => format!(
+            "with `write.intensity = \"unit\"` intensities go from 0 to 1; \
+             `write.map = [\"{name}=Amplitude\"]` keeps them as they are under another name, and \
+             {dropped}"
+        ),
         INTENSITY => format!(
             "`write.intensity = \"unit\"` takes intensities for parts of 65535, from 0 to 1, \
              `write.map = [\"{name}=Amplitude\"]` keeps them as they are under another name, and \

@@ -183,9 +183,10 @@ pub type ScanNumber = Whole<1, 65_535>;
 /// COPC 1.0 (`.copc.laz`) is written from any pipeline that does not move points behind its tiles:
 /// as one file, in point format 6, 7 or 8 (older ones become these; waveforms must be dropped).
 /// Each level of its octree is a picture of the whole: of the points of a cell, of which a node has
-/// 128 a side, one stands for the cell in the node or above it: the one that `graded` kept
-/// first, where the points have its `KeepRank`, else one that a hash of the positions chooses. A subtree of up to 65,536 points is one node. The bytes are a function of the points alone,
-/// and records within a node are ordered by GPS time.
+/// 128 a side, one stands for the cell in the node or above it: the one that `graded` kept first,
+/// where the points have its `KeepRank`, else one that a hash of the positions chooses. A subtree
+/// of up to 65,536 points is one node. The bytes are a function of the points alone, and records
+/// within a node are ordered by GPS time.
 ///
 /// LAS header fields that depend on the points are computed again. The generating software is
 /// pointmill and its version. Where records went through stages, the system identifier is
@@ -262,7 +263,8 @@ pub struct Write {
     /// extension says another is written, with a warning.
     #[serde(default)]
     pub format: Option<FormatName>,
-    /// Dimensions that the output need not hold.
+    /// Dimensions that the output need not hold. A field that every record of its point format has
+    /// is 0 then.
     #[serde(default)]
     pub drop: Vec<String>,
     /// Dimensions that have another name in the output, as `"Amplitude=Intensity"`. One that the
@@ -270,8 +272,8 @@ pub struct Write {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub map: Vec<Renamed>,
     /// Types that dimensions have in the output, as `"Intensity=f32"`: `u8` to `u64`, `i8` to
-    /// `i64`, `f32` and `f64`. Values are rounded to it, which is told; those beyond it are refused.
-    /// Of LAS, extra bytes alone have a type to choose.
+    /// `i64`, `f32` and `f64`. Values are rounded to it, which is told, whole numbers never; those
+    /// beyond it are refused. Of LAS, extra bytes alone have a type to choose.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub types: Vec<Retyped>,
     /// Scale of LAS coordinates per axis, in world units; `"auto"`: the input's, or, of one that is

@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use crate::error::nearest;
+use crate::io::convert::check_drop;
 use crate::io::rows::names::{meant, shared};
 use crate::point::names::XYZ;
 use crate::point::{Dimension, PointBatch, Schema};
@@ -38,7 +39,10 @@ impl<'a> Reshaped<'a> {
             }
         }
         let map = &keys.map;
-        map.iter().try_for_each(|renamed| check_one(renamed, map, &keys.drop, schema))?;
+        map.iter().try_for_each(|renamed| check_one(renamed, &keys, schema))?;
+        if !map.is_empty() {
+            check_drop(schema, &keys.drop)?;
+        }
         let is_moved = |name: &str| map.iter().any(|renamed| renamed.from == name);
         let is_taken = |name: &str| map.iter().any(|renamed| renamed.to == name);
         // What is dropped for another to have its name is not there any more.
@@ -68,8 +72,8 @@ impl<'a> Reshaped<'a> {
 }
 
 /// Refuses what cannot be done of one entry of `map`.
-fn check_one(one: &Renamed, map: &[Renamed], drop: &[String], schema: &Schema) -> Result<()> {
-    let Renamed { from, to } = one;
+fn check_one(one: &Renamed, keys: &WriteKeys, schema: &Schema) -> Result<()> {
+    let (Renamed { from, to }, WriteKeys { map, drop, .. }) = (one, keys);
     let refuse = |told: String| Error::pipeline(format!("`write.map` has `{one}`{told}"));
     if XYZ.iter().any(|axis| axis == from || axis == to) {
         return Err(refuse(": coordinates keep their names".to_owned()));
@@ -83,6 +87,9 @@ fn check_one(one: &Renamed, map: &[Renamed], drop: &[String], schema: &Schema) -
     let sides = |other: &&Renamed| other.from == *from || other.to == *to;
     if map.iter().filter(sides).count() > 1 {
         return Err(refuse(", and another entry has one of the two names".to_owned()));
+    }
+    if keys.computed.contains(to) {
+        return Err(refuse(format!(", and `write.dimensions` computes `{to}`")));
     }
     let is_free = schema.find(to).is_none()
         || drop.contains(to)

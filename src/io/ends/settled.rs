@@ -40,6 +40,9 @@ pub(super) fn settled(
     let key = if scale_is_auto { "write.scale" } else { "write.offset" };
     if source.schema().layout.steps && keys.scale.is_none_or(Setting::is_auto) {
         // The records have steps, which stay as they are.
+        if let Some(offset) = keys.offset.and_then(Setting::given) {
+            check_steps(source, offset)?;
+        }
         keys.scale = None;
         keys.offset = keys.offset.filter(|offset| !offset.is_auto());
         return Ok(Some(keys));
@@ -65,6 +68,24 @@ pub(super) fn settled(
     }
     keys.scale = Some(Setting::Given(scale));
     Ok(Some(keys))
+}
+
+/// Refuses an offset from which the steps of the records do not come out even.
+fn check_steps(source: &dyn Source, offset: [f64; 3]) -> Result<()> {
+    let Some(axes) = source.schema().coordinates() else { return Ok(()) };
+    let is_even = |(axis, offset): (&&Dimension, f64)| {
+        let steps = (offset - axis.origin) / axis.scale;
+        let rounding = 4.0 * f64::EPSILON * offset.abs().max(axis.origin.abs()) / axis.scale.abs();
+        (steps - steps.round()).abs() <= 1e-6 + rounding
+    };
+    match axes.iter().zip(offset).all(is_even) {
+        true => Ok(()),
+        false => Err(Error::pipeline(
+            "`write.scale = \"auto\"` rounds nothing, and `write.offset` is no whole number of steps \
+             from the offset of the input",
+        )
+        .help("give the scale, to which coordinates are rounded, or another offset")),
+    }
 }
 
 /// Where the points are on an axis, and on what grid.

@@ -152,7 +152,8 @@ impl Descriptor {
         let mut bytes = [0; 8];
         bytes.copy_from_slice(&self.0[at::NO_DATA + 8 * i..at::NO_DATA + 8 * i + 8]);
         Some(match scalar {
-            Scalar::F32 | Scalar::F64 => Value::Double(f64::from_le_bytes(bytes)),
+            Scalar::F32 => Value::Single(f64::from_le_bytes(bytes) as f32),
+            Scalar::F64 => Value::Double(f64::from_le_bytes(bytes)),
             Scalar::I8 | Scalar::I16 | Scalar::I32 | Scalar::I64 => {
                 Value::Signed(i64::from_le_bytes(bytes))
             }

@@ -87,7 +87,8 @@ fn common_step(scales: &[f64], offsets: &[f64]) -> Option<f64> {
     }
     let offsets = offsets.iter().map(|offset| Decimal::of(*offset)).collect::<Option<Vec<_>>>()?;
     let ways = offsets.iter().map(|offset| offset.less(offsets[0]));
-    Some(ways.fold(step, Decimal::common).value())
+    let ways = ways.collect::<Option<Vec<_>>>()?;
+    Some(ways.into_iter().fold(step, Decimal::common).value())
 }
 
 /// A decimal: a whole number of 10^-15.
@@ -106,8 +107,8 @@ impl Decimal {
         digits.checked_mul(power).map(Decimal)
     }
 
-    fn less(self, other: Decimal) -> Decimal {
-        Decimal(self.0 - other.0)
+    fn less(self, other: Decimal) -> Option<Decimal> {
+        self.0.checked_sub(other.0).map(Decimal)
     }
 
     /// The largest that both are whole numbers of.
@@ -138,6 +139,7 @@ mod tests {
             (&[0.01], &[638_000.0, 639_000.0], Some(0.01)),
             (&[1e-7, 0.001], &[7.5, -120.25], Some(1e-7)),
             (&[0.1 + 0.2], &[0.0], None),
+            (&[0.01], &[1.6e23, -1.6e23], None),
         ] {
             assert_eq!(common_step(scales, offsets), step, "{scales:?} {offsets:?}");
         }

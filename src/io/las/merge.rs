@@ -125,8 +125,8 @@ fn other_extras(a: &LasInput, b: &LasInput) -> Error {
         false => format!("their extra bytes differ: {one} and {two}"),
     };
     refuse(a, b, why).help(
-        "`read.assume = [\"extra-bytes\"]` brings both to all extra bytes that there are: those that \
-         a file lacks are 0 there, or what their description has for no data",
+        "`read.assume = [\"extra-bytes\"]` brings both to all extra bytes that there are: those \
+         that a file lacks are 0 there, or what their description has for no data",
     )
 }
 

@@ -5,6 +5,7 @@ use super::described::Described;
 use super::extra::{Descriptor, LONGEST_NAME};
 use super::format::{format_of, layout, record_size, records};
 use super::native::Native;
+use crate::point::names::XYZ;
 use crate::point::{Dimension, Schema};
 use crate::stage::WriteKeys;
 use crate::{Error, Result};
@@ -141,6 +142,10 @@ pub(super) fn refuse_types(keys: &WriteKeys, format: u8) -> Result<()> {
          always the same"
     );
     let name = &retyped.name;
+    if XYZ.contains(&name.as_str()) {
+        return Err(Error::pipeline(told)
+            .help("LAS has coordinates in whole steps: `write.scale` says how long one is"));
+    }
     Err(Error::pipeline(told).help(format!(
         "`write.map = [\"{name}={name}2\"]` with `write.types = [\"{name}2={}\"]` has it as extra \
          bytes",

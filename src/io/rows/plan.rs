@@ -6,7 +6,7 @@ use super::colors::{self, Depth, Recoloring, WrittenColors};
 use super::print::{Printer, TextStyle};
 use super::schema::{RowShape, place, row_schema};
 use super::{Encoding, RowForm};
-use crate::io::convert::{AskedValues, Projection, Rounding};
+use crate::io::convert::{AskedValues, Projection, Rounding, TYPES};
 use crate::point::{ComputedDimension, Dimension, PointBatch, Scalar, Schema, Spare, Value};
 use crate::stage::{ChunkSize, Colors, Encode, Encoded, Retyped, WriteKeys};
 use crate::{Error, ErrorKind, Result};
@@ -88,8 +88,15 @@ pub(crate) struct Narrow {
 impl Narrow {
     fn of(options: &RowOptions, form: &RowForm, schema: &Schema) -> Result<Option<Narrow>> {
         let fields = colors::fields(schema, form, &options.asked.drop);
-        let is_typed = options.types.iter().any(|retyped| colors::is_color_name(&retyped.name));
-        if fields.is_empty() || is_typed || options.colors == Some(Colors::Sixteen) {
+        let mut types = options.types.iter();
+        let typed = types.find(|retyped| colors::is_color_name(&retyped.name));
+        if let (Some(typed), Some(_)) = (typed, options.colors) {
+            let told = format!(
+                "`write.types` has `{typed}`, and `write.colors` says the bits of colours, too"
+            );
+            return Err(Error::pipeline(told).help("give one of the two"));
+        }
+        if fields.is_empty() || typed.is_some() || options.colors == Some(Colors::Sixteen) {
             return Ok(None);
         }
         let rows = |place| RowKind::new(options, form, &colors::bytes_of(schema, place));
@@ -197,9 +204,13 @@ impl RowPlan {
 
     /// What was asked for and rounds values, in words.
     pub fn rounded_to(&self) -> Option<&'static str> {
-        let of_types = self.full.projection.as_ref().filter(|_| self.has_types);
-        let of_types = of_types.map(Projection::rounded_to);
-        of_types.or(self.style.decimals.map(|_| "as many decimals as were asked for"))
+        match (self.has_types, self.style.decimals) {
+            (true, None) => Some(TYPES),
+            (true, Some(_)) => {
+                Some("their types in the output, or the decimals that were asked for")
+            }
+            (false, decimals) => decimals.map(|_| "as many decimals as were asked for"),
+        }
     }
 
     pub fn chunk(&self) -> ChunkSize {

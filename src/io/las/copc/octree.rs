@@ -6,11 +6,12 @@
 //! grid of occupied cells for every node, or goes over the scan once for each level.
 //!
 //! Here cells hold a contest. A node has 2^7 cells a side; of the points in a cell the one of the
-//! smallest rank stands for it: the one that a reduction gave it, where the records have such, so
-//! that a coarse level is a coarse reduction, and a hash of its position. Of the eight cells that make a cell of the
-//! next level their winners meet again, so that whoever wins there has won in all cells below. A
-//! point belongs to the level whose cells are the largest that it wins. So the levels down to any
-//! one together have exactly one point in each occupied cell of that level.
+//! smallest rank stands for it: the rank that a reduction gave it, where the records have such, so
+//! that a coarse level is a coarse reduction, and behind that a hash of its position. Of the eight
+//! cells that make a cell of the next level their winners meet again, so that whoever wins there
+//! has won in all cells below. A point belongs to the level whose cells are the largest that it
+//! wins. So the levels down to any one together have exactly one point in each occupied cell of
+//! that level.
 //!
 //! In Morton order a cell of any size is a stretch without gaps: it is settled as soon as a point
 //! lies outside, so one winner for each size is held, besides the points of the nodes around the
