@@ -172,7 +172,7 @@ fn conversions_into_a_folder_are_checked_before_the_first() {
     convert(&["a.las", "-o", "x.laz", "--scale", "-1"], &["--scale: ", "a number above 0"]);
     convert(
         &["a.las", "-o", "x.laz", "--scale", "1,2"],
-        &["--scale: takes a number above 0 without a unit, or three", "not 2 values"],
+        &["--scale: takes a number above 0 without a unit, three of them", "not 2 values"],
     );
     convert(&["a.las", "-o", "x.laz", "--scale", "1,0,1"], &["--scale: ", "a number above 0"]);
     convert(&["a.las", "-o", "x.ply", "--encoding", "txt"], &["--encoding: ", "ascii, binary"]);

@@ -74,7 +74,7 @@ fn what_a_conversion_would_lose_is_told_as_flags_or_as_keys() {
                1 2 3 4\n";
     fs::write(at.join("a.ply"), ply).unwrap();
     let one = told(at, &["convert", "a.ply", "-o", "o.las"], 2);
-    assert!(one.contains("\nhelp: give `--scale 0.001`, or what"), "{one}");
+    assert!(one.contains("\nhelp: give `--scale auto`, which looks"), "{one}");
     let one = told(at, &["convert", "a.ply", "-o", "o.las", "--scale", "0.001"], 2);
     let name = "a_name_of_more_than_thirty_two_bytes";
     assert!(one.contains(&format!("\nhelp: `--drop {name}` leaves them out\n")), "{one}");

@@ -14,7 +14,7 @@ fn case<'a>(at: &Path, name: &'a str) -> &'a str {
 
 /// The lines of points that the case becomes as a text, and what is told.
 fn rows(at: &Path, name: &str) -> (Vec<String>, String) {
-    let arguments = ["convert", case(at, name), "-o", "rows.csv", "--quiet"];
+    let arguments = ["convert", case(at, name), "-o", "rows.csv"];
     let (code, _, told) = pointmill(at, &arguments);
     assert_eq!(code, 0, "{name}: {told}");
     let text = std::fs::read_to_string(at.join("rows.csv")).unwrap();
@@ -117,9 +117,10 @@ fn withheld_points_that_a_reduction_leaves_out_are_told() {
     let at = tempfile::tempdir().unwrap();
     let at = at.path();
     let reduce = ["reduce", case(at, "96-withheld.las"), "-o", "b.las", "--keep", "50%"];
-    let (code, _, told) = pointmill(at, &reduce);
+    let (code, table, told) = pointmill(at, &reduce);
     assert_eq!(code, 0, "{told}");
-    assert!(told.contains("left out   50 withheld (read)"), "{told}");
+    assert!(table.contains("left out   50 withheld (read)"), "{table}");
+    assert!(told.contains("50 of them; `--withheld keep` keeps them"), "{told}");
     assert_eq!(rows_of(at, "b.las"), 25);
 }
 
