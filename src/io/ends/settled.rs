@@ -13,6 +13,9 @@ use crate::{Error, Result};
 
 /// Decimals that are looked for.
 const MOST_DECIMALS: u8 = 12;
+/// How far a coordinate may be from its decimals, in parts of it: steps times a scale, as other
+/// programs sum them up, are some bits off.
+const SLACK: f64 = 4.0 * f64::EPSILON;
 /// Stored coordinates are i32.
 const REACH: f64 = i32::MAX as f64;
 /// The step of a scan without points.
@@ -261,13 +264,13 @@ impl AxisSpread {
     }
 }
 
-/// True if `at` is the number that is nearest to so many decimals.
+/// True if `at` is the number that is nearest to so many decimals, but for some bits.
 fn has_decimals(at: f64, decimals: u8, is_single: bool) -> bool {
     const POWERS: [f64; MOST_DECIMALS as usize + 1] =
         [1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12];
     let power = POWERS[usize::from(decimals.min(MOST_DECIMALS))];
     let near = (at * power).round() / power;
-    if is_single { near as f32 == at as f32 } else { near == at }
+    if is_single { near as f32 == at as f32 } else { (near - at).abs() <= SLACK * at.abs() }
 }
 
 #[cfg(test)]
@@ -299,6 +302,10 @@ mod tests {
             assert_eq!(spread(coordinates, true).step(None), step, "{coordinates:?} as f32");
         }
         assert_eq!(spread(&[1.0 / 3.0], false).step(None), None);
+        // As a scale in binary has it.
+        let steps: Vec<f64> = (63_800_000..63_800_100).map(|step| f64::from(step) * 0.01).collect();
+        assert!(steps.iter().any(|at| (at * 100.0).round() / 100.0 != *at));
+        assert_eq!(spread(&steps, false).step(None), Some(1e-2));
         assert_eq!(spread(&[0.5], false).step(Some(0.125)), Some(1e-3));
     }
 
