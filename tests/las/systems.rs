@@ -125,3 +125,31 @@ fn files_of_one_system_in_other_spellings_merge_and_others_do_not() {
     let told = ["other.las", "--crs", "nothing is reprojected"];
     fails(at, &["convert", "esri.las", "other.las", "-o", "o.las"], 1, &told);
 }
+
+#[test]
+fn files_whose_keys_say_other_units_are_refused_and_a_conversion_is_of_the_system_of_its_input() {
+    let name = "15c-geokeys-epsg-only-2277-5703.las";
+    let at = inputs(&[name]);
+    let at = at.path();
+    let bytes = std::fs::read(at.join(name)).unwrap();
+    let words = |all: &[u16]| all.iter().flat_map(|w| w.to_le_bytes()).collect::<Vec<u8>>();
+    let heights = words(&[4096, 0, 1, 5703]);
+    let place = bytes.windows(8).position(|window| window == heights).unwrap();
+    for (scan, key, value) in
+        [("feet.las", 4099, 9003), ("metres.las", 4099, 9001), ("across.las", 3076, 9001)]
+    {
+        let mut other = bytes.clone();
+        other[place..place + 8].copy_from_slice(&words(&[key, 0, 1, value]));
+        std::fs::write(at.join(scan), other).unwrap();
+    }
+    for other in ["metres.las", "across.las", name] {
+        let told = ["CRS differ", "--crs"];
+        fails(at, &["convert", "feet.las", other, "-o", "no.las"], 1, &told);
+    }
+    done(at, &["convert", "feet.las", "-o", "seven.las", "--point-format", "7", "--quiet"]);
+    let both = ["seven.las", "feet.las", "-o", "both.las", "--point-format", "7", "--quiet"];
+    done(at, &[&["convert"], &both[..]].concat());
+    assert_eq!(crs(at, "seven.las"), crs(at, "feet.las"));
+    done(at, &["convert", "feet.las", "-o", "o.ply", "--quiet"]);
+    assert_eq!(crs(at, "o.ply"), crs(at, "feet.las"), "the heights are in feet in PLY, too");
+}

@@ -19,7 +19,12 @@ pub const GEO_ASCII: u16 = 34737;
 const PROJECTED: u16 = 3072;
 const GEODETIC: u16 = 2048;
 const VERTICAL: u16 = 4096;
-const CITATIONS: [u16; 3] = [1026, 3073, 2049];
+/// Keys that name the system in words; what ends each text among them.
+const CITATION: u16 = 1026;
+const PROJECTED_CITATION: u16 = 3073;
+const CITATIONS: [u16; 3] = [CITATION, PROJECTED_CITATION, 2049];
+const VERTICAL_CITATION: u16 = 4097;
+const SEPARATOR: char = '|';
 /// Keys that name units (sections 7.5 to 7.7), and the model type that means longitude and
 /// latitude.
 const MODEL_TYPE: u16 = 1024;
@@ -139,31 +144,33 @@ impl GeoKeys {
         let bytes = doubles.as_chunks().0.get(usize::from(entry[3]))?;
         Some(f64::from_le_bytes(*bytes)).filter(|v| v.is_finite())
     }
+
+    /// The value of a key that stands among the texts, if it is not empty.
+    fn citation(&self, key: u16, vlrs: &[Vlr]) -> Option<String> {
+        let entry = self.0.iter().find(|e| e[0] == key && e[1] == GEO_ASCII)?;
+        let ascii = vlrs.iter().find(|v| v.is(USER, GEO_ASCII))?.payload();
+        let start = usize::from(entry[3]);
+        let bytes = ascii.get(start..start.checked_add(usize::from(entry[2]))?)?;
+        let citation = super::text::text(bytes).trim_end_matches(SEPARATOR).to_owned();
+        (!citation.is_empty()).then_some(citation)
+    }
 }
 
-/// EPSG codes of the GeoTIFF keys, else their citation.
+/// EPSG codes of the GeoTIFF keys; WKT where keys describe a projection, or say units that the
+/// codes do not; else their citation.
 pub fn text(vlrs: &[Vlr]) -> Option<String> {
     let keys = GeoKeys::of(vlrs)?;
     let code = |key: u16| keys.code(key);
     // The geodetic system of a projected one without a code is not that of the points.
     let geodetic = || code(GEODETIC).filter(|_| !keys.is_own());
-    if let Some(epsg) = code(PROJECTED).or_else(geodetic) {
-        return Some(match code(VERTICAL) {
-            Some(vertical) => format!("EPSG:{epsg}+{vertical}"),
-            None => format!("EPSG:{epsg}"),
-        });
-    }
-    if let Some(text) = keys.own(vlrs) {
-        return Some(text);
-    }
-    let ascii = vlrs.iter().find(|v| v.is(USER, GEO_ASCII))?.payload();
-    CITATIONS.iter().find_map(|key| {
-        let entry = keys.0.iter().find(|e| e[0] == *key && e[1] == GEO_ASCII)?;
-        let start = usize::from(entry[3]);
-        let bytes = ascii.get(start..start.checked_add(usize::from(entry[2]))?)?;
-        let citation = super::text::text(bytes).trim_end_matches('|').to_owned();
-        (!citation.is_empty()).then_some(citation)
-    })
+    let named = code(PROJECTED).or_else(geodetic).map(|epsg| match code(VERTICAL) {
+        Some(vertical) => format!("EPSG:{epsg}+{vertical}"),
+        None => format!("EPSG:{epsg}"),
+    });
+    let says_all = |text: &String| wkt::units(text).are(&keys.units(vlrs));
+    let whole = if named.as_ref().is_some_and(says_all) { None } else { keys.wkt(vlrs) };
+    let citation = || CITATIONS.iter().find_map(|key| keys.citation(*key, vlrs));
+    whole.or(named).or_else(|| keys.own(vlrs)).or_else(citation)
 }
 
 #[cfg(test)]
@@ -183,6 +190,34 @@ mod tests {
         let vlr = keys(&[1, 1, 0, 2, 3072, 0, 1, 26915, 4096, 0, 1, 5703]);
         assert_eq!(text(&[vlr]).as_deref(), Some("EPSG:26915+5703"));
         assert_eq!(text(&[keys(&[1, 1])]), None, "a directory cut short names nothing");
+    }
+
+    #[test]
+    fn units_that_the_codes_do_not_say_are_in_the_text() {
+        let named = |words: &[u16]| {
+            let mut all = vec![1, 1, 0, (words.len() / 2) as u16];
+            all.extend(words.chunks_exact(2).flat_map(|w| [w[0], 0, 1, w[1]]));
+            let record = [keys(&all)];
+            (text(&record).unwrap(), of(&record))
+        };
+        for words in [
+            &[1024, 1, 3072, 2277, 4099, 9003][..],
+            &[1024, 1, 3072, 2277, 4099, 9001],
+            &[1024, 1, 3072, 2277, 4096, 5703, 4099, 9003],
+            &[1024, 1, 3072, 2277, 4096, 32767, 4099, 9003],
+        ] {
+            let (text, units) = named(words);
+            assert!(text.starts_with("COMPD_CS[\""), "{words:?}: {text}");
+            assert!(wkt::units(&text).are(&units), "{words:?}: {text}");
+        }
+        // The codes say it, or there is no WKT of what contradicts them.
+        for (words, codes) in [
+            (&[1024, 1, 3072, 2277, 3076, 9003, 4096, 6360, 4099, 9003][..], "EPSG:2277+6360"),
+            (&[1024, 1, 3072, 2277, 3076, 9001], "EPSG:2277"),
+            (&[1024, 1, 3072, 2277, 4096, 5103, 4099, 9003], "EPSG:2277+5103"),
+        ] {
+            assert_eq!(named(words).0, codes, "{words:?}");
+        }
     }
 
     #[test]

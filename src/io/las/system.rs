@@ -47,16 +47,17 @@ impl CrsRecords {
         self.vlrs == other.vlrs && self.payloads == other.payloads
     }
 
-    /// True if both say the same: the same bytes, WKT of one wording or the same EPSG codes with
-    /// the same units, or texts that mean one system.
+    /// True if both say the same: the same bytes; or the same units, and WKT of one wording, the
+    /// same EPSG codes or texts that mean one system.
     pub fn same_system(&self, other: &Self) -> Result<bool> {
         if self.payloads == other.payloads {
             return Ok(true);
         }
         let (Some(one), Some(two)) = (self.text()?, other.text()?) else { return Ok(false) };
-        let same = systems::are_alike(&one, &two);
+        let same = systems::are_alike(&one, &two) || systems::mean_one(&one, &two);
+        // Keys of units may say what the text of the codes beside them does not.
         let (own, others) = (units(&self.vlrs, &self.evlrs)?, units(&other.vlrs, &other.evlrs)?);
-        Ok(same && own.are(&others) || systems::mean_one(&one, &two))
+        Ok(same && own.are(&others))
     }
 
     /// See [`text`].
@@ -107,5 +108,32 @@ mod tests {
             of(&[ascii, Vlr::new(USER, GEO_DOUBLES, "", vec![doubles; 8])])
         };
         assert!(!here(1).same_system(&here(2)).unwrap());
+    }
+
+    #[test]
+    fn other_units_or_heights_beside_the_same_words_are_another_system() {
+        let of = |vlrs: &[Vlr]| CrsRecords::of(vlrs, &[]).unwrap();
+        // Keys of units beside the same code, and heights beside the same projection.
+        let beside = |key: u16, value: u16| {
+            of(&[keys(&[1, 1, 0, 3, 1024, 0, 1, 1, 3072, 0, 1, 2277, key, 0, 1, value])])
+        };
+        let zone = |key: u16, value: u16| {
+            let own = [1, 1, 0, 6, 1024, 0, 1, 1, 2048, 0, 1, 4269, 3072, 0, 1, 32767];
+            let rest = [3074, 0, 1, 16014, 3076, 0, 1, 9001, key, 0, 1, value];
+            of(&[keys(&[&own[..], &rest].concat())])
+        };
+        for others in [
+            [beside(4099, 9003), beside(4099, 9001), beside(3076, 9001), beside(4096, 5703)],
+            [zone(4096, 5703), zone(4096, 6360), zone(4099, 9003), zone(4096, 0)],
+        ] {
+            for (n, one) in others.iter().enumerate() {
+                for (m, two) in others.iter().enumerate() {
+                    assert_eq!(one.same_system(two).unwrap(), n == m, "{n} {m}");
+                }
+            }
+        }
+        let text = crate::io::epsg::wkt(2277, Some(6360)).unwrap();
+        let both = of(&[Vlr::new(USER, WKT, "", text.into_bytes())]);
+        assert!(beside(4096, 6360).same_system(&both).unwrap());
     }
 }

@@ -1,8 +1,12 @@
 //! GeoTIFF keys as WKT: the systems that they name, and projections that they describe in place of
 //! a code (GeoTIFF 1.1, section 7.4).
 
-use super::{GEODETIC, GeoKeys, LINEAR_UNITS, METHOD, PROJECTED, VERTICAL, VERTICAL_UNITS};
+use super::{
+    CITATION, GEODETIC, GeoKeys, LINEAR_UNITS, METHOD, PROJECTED, PROJECTED_CITATION, SEPARATOR,
+    VERTICAL, VERTICAL_CITATION, VERTICAL_UNITS,
+};
 use crate::io::las::vlr::Vlr;
+use crate::io::wkt::tree;
 use crate::io::{epsg, wkt};
 
 /// Keys of the numbers of projections: parallels, origins, shifts, factors (section 7.4).
@@ -27,13 +31,22 @@ impl GeoKeys {
         let base = epsg::wkt(self.code(GEODETIC)?.into(), None)?;
         let base = base.starts_with("GEOGCS").then_some(base)?;
         let unit = epsg::unit_text(self.value(LINEAR_UNITS)?.into())?;
-        let mut text = format!("PROJCS[\"unnamed\",{base},");
+        let cited = [PROJECTED_CITATION, CITATION].iter().find_map(|key| self.name(*key, vlrs));
+        let name = quoted(cited.as_deref().unwrap_or("unnamed"));
+        let mut text = format!("PROJCS[{name},{base},");
         let (method, parameters) = self.projection(vlrs)?;
         text += &format!("PROJECTION[\"{method}\"],");
         for (name, value) in parameters {
             text += &format!("PARAMETER[\"{name}\",{value}],");
         }
         Some(text + &unit + ",AXIS[\"Easting\",EAST],AXIS[\"Northing\",NORTH]]")
+    }
+
+    /// What a key among the texts calls something, on one line.
+    fn name(&self, key: u16, vlrs: &[Vlr]) -> Option<String> {
+        let citation = self.citation(key, vlrs)?;
+        let name = citation.split(SEPARATOR).next()?.replace(char::is_control, " ");
+        Some(name.trim().to_owned()).filter(|name| !name.is_empty())
     }
 
     /// A method and its parameters, in the words of WKT 1.
@@ -77,35 +90,52 @@ impl GeoKeys {
             Some(code) if !self.is_own() => epsg::wkt(code.into(), None)?,
             _ => self.own(vlrs)?,
         };
-        let unit = self.value(VERTICAL_UNITS).filter(|_| self.has(VERTICAL_UNITS));
-        let up = match (self.code(VERTICAL), unit) {
-            (None, None) if self.has(VERTICAL) => return None,
-            (None, None) => None,
-            (Some(code), None) => Some(epsg::vertical_text(code.into())?),
-            (Some(code), Some(unit)) => {
-                // Heights of NAVD 88 in metres by their code, and in feet by the key beside it.
-                let code = match (code, unit) {
-                    (5703, 9002) => 8228,
-                    (5703, 9003) => 6360,
-                    (code, _) => code,
-                };
-                Some(epsg::vertical_text(code.into())?)
-            }
-            (None, Some(unit)) => Some(format!(
-                "VERT_CS[\"unknown\",VERT_DATUM[\"unknown\",2005],{},\
-                 AXIS[\"Gravity-related height\",UP]]",
-                epsg::unit_text(unit.into())?
-            )),
-        };
-        let text = match up {
+        let text = match self.heights(vlrs)? {
             None => across,
             Some(up) => {
-                let name = |text: &str| text.split('"').nth(1).unwrap_or_default().to_owned();
-                format!("COMPD_CS[\"{} + {}\",{across},{up}]", name(&across), name(&up))
+                let both = format!("{} + {}", name_of(&across)?, name_of(&up)?);
+                format!("COMPD_CS[{},{across},{up}]", quoted(&both))
             }
         };
         wkt::units(&text).are(&self.units(vlrs)).then_some(text)
     }
+
+    /// WKT 1 of the system of heights, `Some(None)` if there is none.
+    fn heights(&self, vlrs: &[Vlr]) -> Option<Option<String>> {
+        let unit = self.value(VERTICAL_UNITS).filter(|_| self.has(VERTICAL_UNITS));
+        let text = match (self.code(VERTICAL), unit) {
+            (None, None) => return (!self.has(VERTICAL)).then_some(None),
+            (Some(code), unit) => {
+                // Heights of NAVD 88 in metres by their code, and in feet by the key beside it.
+                let code = match (code, unit) {
+                    (5703, Some(9002)) => 8228,
+                    (5703, Some(9003)) => 6360,
+                    (code, _) => code,
+                };
+                epsg::vertical_text(code.into())?
+            }
+            (None, Some(unit)) => {
+                let cited = self.name(VERTICAL_CITATION, vlrs);
+                let name = quoted(cited.as_deref().unwrap_or("unknown"));
+                let unit = epsg::unit_text(unit.into())?;
+                format!(
+                    "VERT_CS[{name},VERT_DATUM[{name},2005],{unit},\
+                     AXIS[\"Gravity-related height\",UP]]"
+                )
+            }
+        };
+        Some(Some(text))
+    }
+}
+
+/// `name` as WKT has texts.
+fn quoted(name: &str) -> String {
+    format!("\"{}\"", name.replace('"', "\"\""))
+}
+
+/// What the system of this WKT is called.
+fn name_of(text: &str) -> Option<String> {
+    tree::parse(text)?.into_iter().next()?.values.into_iter().next()
 }
 
 /// A zone of UTM by the code of its projection: 160 and its number north, 161 and its number south.
@@ -126,7 +156,7 @@ fn utm(code: u16) -> Option<(&'static str, Vec<(&'static str, f64)>)> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{GEO_DOUBLES, GEO_KEYS, USER, text as named};
+    use super::super::{GEO_ASCII, GEO_DOUBLES, GEO_KEYS, USER, text as named};
     use super::*;
     use crate::point::Units;
 
@@ -177,10 +207,66 @@ mod tests {
         }
     }
 
+    /// Keys that describe a projection, but for its method and unit.
+    const OWN: [u16; 10] = [1024, 1, 2048, 4269, 2054, 9102, 3072, 32767, 3074, 32767];
+    const NUMBERS: [(u16, f64); 5] =
+        [(3080, -100.5), (3081, 29.5), (3092, 0.9999), (3082, 700.0), (3083, 3000.0)];
+
+    /// Keys with citations: the directory and what stands in its texts.
+    fn cited(words: &[u16], numbers: &[(u16, f64)], citations: &[(u16, &str)]) -> Vec<Vlr> {
+        let [directory, doubles] = described(words, numbers);
+        let mut all = directory.payload().to_vec();
+        let mut ascii = String::new();
+        for (key, citation) in citations {
+            let (start, length) = (ascii.len() as u16, citation.len() as u16 + 1);
+            all.extend([*key, GEO_ASCII, length, start].iter().flat_map(|w| w.to_le_bytes()));
+            ascii += &format!("{citation}|");
+        }
+        let directory = Vlr::new(USER, GEO_KEYS, "", all);
+        vec![directory, doubles, Vlr::new(USER, GEO_ASCII, "", ascii.into_bytes())]
+    }
+
+    #[test]
+    fn systems_are_called_what_citations_call_them() {
+        let heights = [1024, 1, 3072, 2277, 4099, 9003];
+        let named = |text: &str| wkt_of(&cited(&heights, &[], &[(4097, text)])).unwrap();
+        let text = named("NAVD88 \"ft\", Geoid12B");
+        let height = "\"NAVD88 \"\"ft\"\", Geoid12B\"";
+        assert!(text.contains(&format!("VERT_CS[{height},VERT_DATUM[{height},2005]")), "{text}");
+        let both = "NAD83 / Texas Central (ftUS) + NAVD88 \"\"ft\"\", Geoid12B";
+        assert!(text.starts_with(&format!("COMPD_CS[\"{both}\",PROJCS[")), "{text}");
+        assert!(wkt::is_closed(&text) && wkt::units(&text).are(&wkt::units("EPSG:2277+6360")));
+        assert!(named(" \n|ft").contains("VERT_DATUM[\"unknown\",2005]"), "nothing is no name");
+        assert!(named("a\nb|c").contains("VERT_DATUM[\"a b\",2005]"), "one line, one text");
+
+        let mercator = [&OWN[..], &[3075, 1, 3076, 9001]].concat();
+        for (citations, name) in [
+            (&[(1026, "All"), (3073, "Texas TMX")][..], "Texas TMX"),
+            (&[(1026, "All")], "All"),
+            (&[(2049, "NAD83")], "unnamed"),
+        ] {
+            let text = wkt_of(&cited(&mercator, &NUMBERS, citations)).unwrap();
+            assert!(text.starts_with(&format!("PROJCS[\"{name}\",GEOGCS[")), "{text}");
+        }
+    }
+
+    #[test]
+    fn heights_of_a_described_projection_are_in_the_text() {
+        let text = |heights: &[u16]| {
+            let keys = described(&[&OWN[..], &[3075, 1, 3076, 9001], heights].concat(), &NUMBERS);
+            named(&keys).unwrap()
+        };
+        let feet = text(&[4096, 6360]);
+        assert!(feet.starts_with("COMPD_CS[\"unnamed + NAVD88 height (ftUS)\",PROJCS["), "{feet}");
+        assert!(feet.contains("AUTHORITY[\"EPSG\",\"6360\"]]"), "{feet}");
+        let metres = text(&[4099, 9001]);
+        assert_eq!(wkt::units(&metres).vertical, Some(1.0), "{metres}");
+        assert!(text(&[]).starts_with("PROJCS["));
+    }
+
     #[test]
     fn projections_that_keys_describe_become_wkt() {
-        let own = [1024, 1, 2048, 4269, 2054, 9102, 3072, 32767, 3074, 32767];
-        let numbers = [(3080, -100.5), (3081, 29.5), (3092, 0.9999), (3082, 700.0), (3083, 3000.0)];
+        let (own, numbers) = (OWN, NUMBERS);
         let mercator = described(&[&own[..], &[3075, 1, 3076, 9003]].concat(), &numbers);
         let text = wkt_of(&mercator).unwrap();
         assert!(text.starts_with("PROJCS[\"unnamed\",GEOGCS[\"NAD83\""), "{text}");
