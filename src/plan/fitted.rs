@@ -102,8 +102,7 @@ impl Graph {
     /// cannot appear where it should, and a memory that cannot do, with the size that would.
     pub fn plan(self, overrides: &Overrides) -> Result<Plan> {
         let (origin, file, traits) = (self.origin.clone(), self.file.clone(), self.traits);
-        let settings = self.settings.clone().with(overrides);
-        let rules = self.accept.clone();
+        let (settings, rules) = (self.settings.clone().with(overrides), self.accept.clone());
         let told = ToldGraph::of(&self, &settings);
         let mut sorted = Sorted::new(self)?;
         let places = |read: &[PathBuf], sinks: &[Box<dyn CreateSink>]| {

@@ -49,11 +49,16 @@ pub(super) fn meaning(record: &Record, cloud: &PointCloud) -> Meaning {
         RecordName::ReturnIndex => Meaning::FromZero(n::RETURN_NUMBER),
         RecordName::TimeStamp => Meaning::Of(TIME_STAMP.to_owned()),
         RecordName::IsTimeStampInvalid => Meaning::NoValue(&[]),
+        // Names of outputs of ours are those of dimensions.
+        RecordName::Unknown { name, namespace } if namespace == OWN => Meaning::Of(name.clone()),
         RecordName::Unknown { name, .. } => {
             Meaning::Of(heading(name).map_or_else(|| name.clone(), str::to_owned))
         }
     }
 }
+
+/// The prefix of what outputs of ours have and the standard has no name for.
+pub(super) const OWN: &str = "pm";
 
 /// Seconds since the scan began: no time that other formats have.
 pub(super) const TIME_STAMP: &str = "TimeStamp";

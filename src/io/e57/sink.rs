@@ -12,7 +12,7 @@ use std::sync::Arc;
 use e57::{E57Writer, Extension, Record, RecordDataType, RecordName, RecordValue};
 use sha2::{Digest, Sha256};
 
-use super::fields::TIME_STAMP;
+use super::fields::{OWN, TIME_STAMP};
 use super::info::{NOTE, name};
 use super::names::RECORDS;
 use crate::io::rows::file::{Heading, RowFile};
@@ -34,7 +34,7 @@ const FORM: RowForm = RowForm {
 
 /// Where surface normals are described, and where what has no name in E57 is.
 const NORMALS: [&str; 2] = ["nor", "http://www.libe57.org/E57_NOR_surface_normals.txt"];
-const OWN: [&str; 2] = ["pm", "https://pointmill.org/e57"];
+const EXTENSION: [&str; 2] = [OWN, "https://pointmill.org/e57"];
 
 /// Rows read at once.
 const AT_ONCE: usize = 1 << 13;
@@ -148,7 +148,7 @@ fn extension(dimension: &str) -> RecordName {
     let name: String = dimension.chars().map(letter).collect();
     let begins = name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_');
     let name = if begins { name } else { format!("_{name}") };
-    RecordName::Unknown { namespace: OWN[0].to_owned(), name }
+    RecordName::Unknown { namespace: OWN.to_owned(), name }
 }
 
 fn data_type(column: &Dimension) -> RecordDataType {
@@ -244,7 +244,7 @@ impl E57Sink {
                 _ => false,
             })
         };
-        for [space, url] in [NORMALS, OWN] {
+        for [space, url] in [NORMALS, EXTENSION] {
             if uses(space) {
                 writer.register_extension(Extension::new(space, url)).map_err(failed)?;
             }

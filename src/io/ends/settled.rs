@@ -84,8 +84,8 @@ fn check_steps(source: &dyn Source, offset: [f64; 3]) -> Result<()> {
     match axes.iter().zip(offset).all(is_even) {
         true => Ok(()),
         false => Err(Error::pipeline(
-            "`write.scale = \"auto\"` rounds nothing, and `write.offset` is no whole number of steps \
-             from the offset of the input",
+            "`write.scale = \"auto\"` rounds nothing, and `write.offset` is no whole number of \
+             steps from the offset of the input",
         )
         .help("give the scale, to which coordinates are rounded, or another offset")),
     }

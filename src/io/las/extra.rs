@@ -208,6 +208,21 @@ pub fn with_computed(
     all
 }
 
+/// What stands in the values of `all` that records with `own` descriptors lack, where that is not
+/// 0: the value of each that means no data.
+pub fn absent(own: &[Descriptor], all: &[Descriptor], start: usize) -> Vec<(Dimension, Value)> {
+    let mut at = start;
+    let mut absent = Vec::new();
+    for descriptor in all {
+        if !own.iter().any(|own| own.name() == descriptor.name()) {
+            let each = descriptor.dimensions(at).into_iter().enumerate();
+            absent.extend(each.filter_map(|(i, d)| Some((d, descriptor.no_data(i)?))));
+        }
+        at += descriptor.size();
+    }
+    absent
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -7,7 +7,6 @@ use super::extra::Descriptor;
 use super::input::LasInput;
 use super::union::described;
 use crate::error::shown;
-use crate::point::{Dimension, Value};
 use crate::stage::OnError;
 use crate::{Error, Result};
 
@@ -63,19 +62,4 @@ fn unlike(name: &str, path: &Path, other: &Path) -> Error {
         "convert one of the two by itself first: `write.types = [\"{name}=f64\"]` gives it a type, \
          `write.map` another name"
     ))
-}
-
-/// What stands in the values of `all` that records with `own` descriptors lack, where that is not
-/// 0: the value of each that means no data.
-pub fn absent(own: &[Descriptor], all: &[Descriptor], start: usize) -> Vec<(Dimension, Value)> {
-    let mut at = start;
-    let mut absent = Vec::new();
-    for descriptor in all {
-        if !own.iter().any(|own| own.name() == descriptor.name()) {
-            let each = descriptor.dimensions(at).into_iter().enumerate();
-            absent.extend(each.filter_map(|(i, d)| Some((d, descriptor.no_data(i)?))));
-        }
-        at += descriptor.size();
-    }
-    absent
 }

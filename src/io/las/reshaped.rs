@@ -50,7 +50,7 @@ pub(super) fn reshaped(
         }
         None => Vec::new(),
     };
-    let known = Known::of(&known, own);
+    let known = KnownDescriptors::of(&known, own);
     let mut target = Schema { layout: records(format), ..fields };
     let mut descriptors = Vec::new();
     let mut rest = &extras[..];
@@ -80,9 +80,9 @@ fn retyped(extra: &Dimension, keys: &WriteKeys) -> Dimension {
 }
 
 /// The descriptors of the input, each with the byte of a record at which its first value begins.
-struct Known<'a>(Vec<(usize, &'a Descriptor)>);
+struct KnownDescriptors<'a>(Vec<(usize, &'a Descriptor)>);
 
-impl<'a> Known<'a> {
+impl<'a> KnownDescriptors<'a> {
     fn of(all: &'a [Descriptor], own: usize) -> Self {
         let mut at = own;
         let placed = all.iter().map(|descriptor| {
@@ -90,7 +90,7 @@ impl<'a> Known<'a> {
             at += descriptor.size();
             (start, descriptor)
         });
-        Known(placed.collect())
+        KnownDescriptors(placed.collect())
     }
 
     fn at(&self, offset: usize) -> Option<&'a Descriptor> {
@@ -161,9 +161,17 @@ fn refuse_fields(keys: &WriteKeys, schema: &Schema, fields: &Schema) -> Result<(
         "`write.drop` names `{field}`, which every record of LAS point format {} has",
         format_of(fields).unwrap_or(0)
     );
-    Err(Error::pipeline(told).help(
-        "`write.point_format` may name one that does not have it; extra bytes can be left out",
-    ))
+    let error = Error::pipeline(told);
+    if XYZ.contains(&field.as_str()) {
+        return Err(error.help("coordinates stay: leave it out"));
+    }
+    let without = |format: &u8| layout(*format, &[], [1.0; 3], [0.0; 3]).find(field).is_none();
+    Err(error.help(match (0..=10).find(without) {
+        Some(format) => format!(
+            "`write.point_format = {format}` does not have it; extra bytes can be left out of any"
+        ),
+        None => "all point formats have it; extra bytes can be left out".to_owned(),
+    }))
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use super::packed::Packed;
 use crate::error::shown;
 use crate::io::damage::Losses;
 use crate::io::origin::Origin;
-use crate::io::rows::names::heading;
+use crate::io::rows::names::heading_among;
 use crate::io::rows::schema::{ALPHA, PACKED};
 use crate::point::names::{BLUE, COLUMN, GREEN, RED, ROW, XYZ};
 use crate::point::{Dimension, Endian, Scalar, Schema};
@@ -109,7 +109,8 @@ impl PcdFile {
         let mut names = Vec::new();
         for field in &self.header.fields {
             for n in 0..field.count {
-                let name = match heading(&field.name) {
+                let all = self.header.fields.iter().map(|field| field.name.as_str());
+                let name = match heading_among(&field.name, all) {
                     _ if field.count > 1 => format!("{}_{n}", field.name),
                     Some(known) => known.to_owned(),
                     None => field.name.clone(),

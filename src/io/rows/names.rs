@@ -131,6 +131,17 @@ pub(crate) fn heading(word: &str) -> Option<&'static str> {
     found.or_else(other).or_else(|| field_of(&format!("scalar_{}", word.strip_prefix("scalar")?)))
 }
 
+/// The dimension that a word of a heading means among `all` words of it: one that only a spelling
+/// tells is left to a word that is its name.
+pub(crate) fn heading_among<'a>(
+    word: &str,
+    mut all: impl Iterator<Item = &'a str>,
+) -> Option<&'static str> {
+    let known = heading(word)?;
+    let is_name = |word: &str| shared(word) == Some(known);
+    (is_name(word) || !all.any(is_name)).then_some(known)
+}
+
 /// The dimension that formats share of which `word` is the name, here or in PLY, whatever its case.
 pub(crate) fn shared(word: &str) -> Option<&'static str> {
     let is_its = |name: &str| name.eq_ignore_ascii_case(word);
@@ -201,6 +212,10 @@ mod tests {
             assert_eq!(meant(word, &schema), dimension, "{word}");
         }
         assert_eq!((shared("intensity"), shared("time")), (Some("Intensity"), None));
+        let among = |all: &[&'static str]| heading_among("Time", all.iter().copied());
+        assert_eq!(among(&["X", "Time"]), Some("GpsTime"));
+        assert_eq!(among(&["Time", "GpsTime"]), None);
+        assert_eq!(among(&["gps_time", "Time"]), None);
     }
 
     #[test]

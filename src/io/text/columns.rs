@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::error::{listed, shown};
 use crate::io::rows::facts::{ColumnFacts, whole};
-use crate::io::rows::names::heading;
+use crate::io::rows::names::heading_among;
 use crate::point::Scalar;
 use crate::point::names::{BLUE, GREEN, INTENSITY, NORMAL, POINT_SOURCE_ID, RED, XYZ};
 use crate::{Error, Result};
@@ -22,7 +22,7 @@ pub(super) const SKIPPED: &str = "_";
 pub(super) fn dimensions(names: &[String]) -> Result<Vec<Option<String>>, String> {
     let mut all: Vec<Option<String>> = Vec::new();
     for (n, name) in names.iter().enumerate() {
-        let dimension = match heading(name) {
+        let dimension = match heading_among(name, names.iter().map(String::as_str)) {
             Some(known) => known.to_owned(),
             None if name.is_empty() => format!("column_{}", n + 1),
             None => name.clone(),
