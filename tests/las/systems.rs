@@ -127,7 +127,7 @@ fn files_of_one_system_in_other_spellings_merge_and_others_do_not() {
 }
 
 #[test]
-fn files_whose_keys_say_other_units_are_refused_and_a_conversion_is_of_the_system_of_its_input() {
+fn keys_of_other_units_are_other_systems_and_a_conversion_is_of_that_of_its_input() {
     let name = "15c-geokeys-epsg-only-2277-5703.las";
     let at = inputs(&[name]);
     let at = at.path();
@@ -151,5 +151,6 @@ fn files_whose_keys_say_other_units_are_refused_and_a_conversion_is_of_the_syste
     done(at, &[&["convert"], &both[..]].concat());
     assert_eq!(crs(at, "seven.las"), crs(at, "feet.las"));
     done(at, &["convert", "feet.las", "-o", "o.ply", "--quiet"]);
-    assert_eq!(crs(at, "o.ply"), crs(at, "feet.las"), "the heights are in feet in PLY, too");
+    done(at, &["convert", "o.ply", "-o", "back.las", "--scale", "0.01", "--quiet"]);
+    assert_eq!(crs(at, "back.las"), crs(at, "feet.las"), "PLY says it, too");
 }
