@@ -17,6 +17,7 @@ use super::words::{Told, Words};
 use super::{interrupt, print};
 use crate::engine::{Done, Watch};
 use crate::error::shown;
+use crate::host::standard;
 use crate::language::Registry;
 use crate::plan::{FittedSize, Plan};
 use crate::report::{Decision, Short};
@@ -105,7 +106,8 @@ impl Console {
 
     /// From now on Ctrl-C asks the run to stop, rather than ending the process.
     pub fn hear_interrupts(&self) {
-        self.interrupted.get_or_init(interrupt::flag);
+        let flag = self.interrupted.get_or_init(interrupt::flag);
+        standard::wait_until(Arc::clone(flag));
     }
 
     /// Behind what a run chooses by itself, say this.

@@ -93,6 +93,13 @@ impl FigureWord {
         }
     }
 
+    /// Of how many points it is, and how many of these it leaves out as they have no angle, where
+    /// there are such.
+    pub fn left_out(self, all: &Judged<'_>) -> Option<[u64; 2]> {
+        let FigureWord::Normals(_) = self else { return None };
+        all.normals.map(NormalAngles::without).filter(|[_, without]| *without > 0)
+    }
+
     /// The bound that stands behind it.
     pub fn bound(
         self,

@@ -10,7 +10,7 @@ use super::same::{PartOf, RecordsComparison, open};
 use crate::expression::ExpressionFault;
 use crate::language::Registry;
 use crate::quantity::Figure;
-use crate::report::{ACCEPT_RULES, Long, RuleText};
+use crate::report::{ACCEPT_RULES, Grouped, Long, RuleText};
 use crate::{Error, ErrorKind, Result};
 
 /// What two scans must be beside each other, as rules between commas:
@@ -124,16 +124,18 @@ impl CompareRules {
     /// What the rules come to. Where nothing was measured, a rule on distances does not hold.
     pub(super) fn judge(&self, all: &Judged<'_>) -> CompareVerdict {
         let judged = |rule: &CompareRule| {
-            let (passed, found, bound, unit) = match rule.of {
-                RuleOf::Records(word) => (word.holds(all.records), None, None, None),
+            let (mut unit, mut left_out) = (None, None);
+            let (passed, found, bound) = match rule.of {
+                RuleOf::Records(word) => (word.holds(all.records), None, None),
                 RuleOf::Figure(figure, may_be_equal, bound) => {
-                    let (found, unit) = (figure.of(all), bound.unit(all));
+                    (unit, left_out) = (bound.unit(all), figure.left_out(all));
+                    let found = figure.of(all);
                     let bound = bound.value();
                     let is_within = |v: f64| v < bound || may_be_equal && v == bound;
-                    (found.is_some_and(is_within), found, Some(bound), unit)
+                    (found.is_some_and(is_within), found, Some(bound))
                 }
             };
-            CompareRuleVerdict { rule: rule.text.clone(), passed, found, bound, unit }
+            CompareRuleVerdict { rule: rule.text.clone(), passed, found, bound, unit, left_out }
         };
         let rules: Vec<CompareRuleVerdict> = self.0.iter().map(judged).collect();
         CompareVerdict { passed: rules.iter().all(|rule| rule.passed), rules }
@@ -214,16 +216,24 @@ pub struct CompareRuleVerdict {
     pub bound: Option<f64>,
     #[serde(skip)]
     unit: Option<&'static str>,
+    /// Of how many points the figure is, and how many of these have no angle, where some have none.
+    #[serde(skip)]
+    left_out: Option<[u64; 2]>,
 }
 
 impl CompareRuleVerdict {
     /// The rule and what was found, in words.
     fn told(&self) -> String {
+        let left_out = self.left_out.map_or(String::new(), |[all, without]| {
+            format!("; {} of {} points have no angle", Grouped(without), Grouped(all))
+        });
         match (self.bound, self.found) {
             (Some(_), Some(found)) => {
-                format!("{}, and it is {}", self.rule, Long(found, self.unit))
+                format!("{}, and it is {}{left_out}", self.rule, Long(found, self.unit))
             }
-            (Some(_), None) => format!("{}, and the scans have no such figure", self.rule),
+            (Some(_), None) => {
+                format!("{}, and the scans have no such figure{left_out}", self.rule)
+            }
             (None, _) => self.rule.clone(),
         }
     }

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use super::publish::Staged;
 use super::scratch::Trouble;
 use crate::error::shown;
-use crate::host::{Clash, Files};
+use crate::host::{Clash, Files, standard};
 use crate::stage::{CreateSink, Input};
 use crate::{Error, Result};
 
@@ -26,7 +26,7 @@ pub(crate) struct Beside {
 impl Beside {
     /// The copy of what is beside `input` for the output of `sink`, if there is to be one: a file
     /// that is there already, because an output is beside its input and has its name, is left
-    /// alone.
+    /// alone, and nothing is beside standard output; see [`missing`].
     ///
     /// # Errors
     ///
@@ -39,6 +39,9 @@ impl Beside {
         let Some((from, extension)) = input.beside.as_ref().filter(|_| sink.wants_beside()) else {
             return Ok(None);
         };
+        if standard::is_output(sink.path()) {
+            return Ok(None);
+        }
         let to = sink.path().with_extension(extension);
         match files.copy(from, &to) {
             Ok(wanted) => Ok(wanted.then(|| Beside { from: from.clone(), to })),
@@ -52,6 +55,18 @@ impl Beside {
         copy(&self.from, staged.file()).map_err(|error| staged.tell(error))?;
         Ok(staged)
     }
+}
+
+/// What to say where the records of `inputs` that `sink` gets refer to a file that is not beside
+/// it, since it is standard output.
+pub(crate) fn missing(inputs: &[Input], sink: &dyn CreateSink) -> Option<String> {
+    let is_wanted = standard::is_output(sink.path()) && sink.wants_beside();
+    let (from, _) = inputs.iter().filter(|_| is_wanted).find_map(|one| one.beside.as_ref())?;
+    Some(format!(
+        "records of standard output refer to waveforms in {}, which has no copy beside it: put one \
+         beside the file that you make of it, under its name",
+        shown(from)
+    ))
 }
 
 /// Copies what is in a file, with the mode that all new files get, and brings the copy to disk.

@@ -12,17 +12,20 @@
 
 mod sorter;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
+use std::ffi::OsStr;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
 use super::by_time::ByTime;
 use super::job::Job;
-use super::publish::Staged;
+use super::publish::{Staged, folder_of};
 use super::row::RowLayout;
 use crate::budget::Bytes;
+use crate::error::shown;
 use crate::host::lock;
 use crate::point::{Metadata, PointBatch, Schema};
+use crate::report::Grouped;
 use crate::stage::{
     ChunkSize, CreateSink, Encode, Encoded, OutputSplit, Sink, SinkSummary, SplitKey,
 };
@@ -266,6 +269,30 @@ fn measured(job: &Job<'_>, number: usize, split: &OutputSplit, bytes: u64) -> Re
     // Tables of chunks and checksums of pages grow with the points.
     let room = bytes.saturating_sub(taken) / 100 * 99;
     Ok(SplitSorter::Bytes(room, encoder, by_time(job, number, &*create)))
+}
+
+/// What to say of files whose names are those of files of a split, and which are not among those
+/// that were `written`.
+pub(crate) fn others_of_split(create: &dyn CreateSink, written: &[PathBuf]) -> Option<String> {
+    let written: HashSet<&OsStr> = written.iter().filter_map(|path| path.file_name()).collect();
+    let there = std::fs::read_dir(folder_of(create.path())).ok()?.flatten();
+    let others = there.map(|entry| entry.path()).filter(|path| {
+        let is_written = path.file_name().is_some_and(|name| written.contains(name));
+        !is_written && create.may_name(path)
+    });
+    let mut others: Vec<PathBuf> = others.collect();
+    others.sort();
+    let more = match others.len() {
+        0 => return None,
+        all @ 4.. => format!(" and {} more", Grouped(all as u64 - 3)),
+        _ => String::new(),
+    };
+    let first: Vec<String> = others.iter().take(3).map(|path| shown(path).to_string()).collect();
+    Some(format!(
+        "{}{more} were there before and are not of this run: remove them if they are of an earlier \
+         one",
+        first.join(", ")
+    ))
 }
 
 /// What stages see of an output of files: one sink, which takes records as they come.

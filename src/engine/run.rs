@@ -11,7 +11,7 @@ use std::sync::Arc;
 use super::Watch;
 use super::account::nothing_left;
 use super::by_rank::listed_bytes;
-use super::by_split::{BySplit, SplitFile, SplitSink};
+use super::by_split::{BySplit, SplitFile, SplitSink, others_of_split};
 use super::clock::Clock;
 use super::finished::Finished;
 use super::job::Job;
@@ -246,6 +246,7 @@ impl Task {
         }
         let mut run = self.figures(&finished, &job);
         run.warnings.extend(nothing_left(&finished, &job));
+        run.warnings.extend(self.left_beside(&finished));
         run.warnings.extend(memory_warning(folder, job.area.written()));
         run.warnings.iter().for_each(|warning| watch.warn(warning));
         run.warnings.splice(0..0, job.warned());
@@ -286,6 +287,13 @@ impl Task {
             }
         }
         Ok(staged)
+    }
+
+    /// What to say of files in the folder of a split that this run did not write, and whose names
+    /// are those of the split's files all the same.
+    fn left_beside(&self, finished: &Finished) -> Vec<String> {
+        let of_each = self.sinks.iter().zip(&finished.split).filter(|(sink, _)| sink.is_split());
+        of_each.filter_map(|(sink, written)| others_of_split(&**sink, written)).collect()
     }
 
     /// Refuses disks that have no room for what is spilled and, where nothing is removed, for

@@ -8,15 +8,18 @@
 //! complete.
 //!
 //! A process has one standard input, and it can be read once. That is why this is the one state
-//! that belongs to no value: what was set down.
+//! that belongs to no value: what was set down, and what ends waiting for it.
 
 use std::fs::{self, File, Metadata};
-use std::io::{self, IsTerminal, Seek};
+use std::io::{self, IsTerminal, Read, Seek, Write};
 use std::os::fd::{AsFd, IntoRawFd};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, OnceLock};
 
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{CWD, Mode, OFlags, openat};
+use rustix::io::Errno;
 
 use super::threads::lock;
 use crate::error::{STANDARD_INPUT, STANDARD_OUTPUT, shown};
@@ -50,7 +53,8 @@ pub fn output(typed: PathBuf) -> PathBuf {
 ///
 /// # Errors
 ///
-/// Standard input that is a terminal, or that cannot be read or set down.
+/// Standard input that is a terminal, or that cannot be read or set down, and
+/// [`ErrorKind::Interrupted`] if it is [not waited for](wait_until) any longer.
 pub fn opened(path: &Path) -> Result<PathBuf> {
     if !is_input(path) {
         return Ok(path.to_owned());
@@ -108,6 +112,17 @@ pub fn send(file: &Path) -> Result<()> {
     }
 }
 
+/// Bytes of standard input that are set down at once.
+const BLOCK: usize = 1 << 18;
+
+/// Set once standard input is not waited for any longer.
+static STOP: OnceLock<Arc<AtomicBool>> = OnceLock::new();
+
+/// From now on standard input is not waited for once `stop` is set. The first to say so is heard.
+pub fn wait_until(stop: Arc<AtomicBool>) {
+    STOP.get_or_init(|| stop);
+}
+
 /// What became of standard input.
 enum InputState {
     Unread,
@@ -139,12 +154,37 @@ fn take(path: &Path) -> Result<PathBuf> {
         Error::io(&folder, "set standard input down here", e)
             .help("`TMPDIR` names another folder for it")
     })?;
-    io::copy(&mut input, &mut file).map_err(|e| {
+    let setting_down = |e| {
         Error::io(path, &format!("set it down in {}", shown(&folder)), e)
             .help("`TMPDIR` names another folder for it, on a disk with room for all of it")
-    })?;
+    };
+    let mut block = vec![0; BLOCK];
+    loop {
+        wait(&input, path)?;
+        match input.read(&mut block) {
+            Ok(0) => break,
+            Ok(read) => file.write_all(&block[..read]).map_err(setting_down)?,
+            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+            Err(e) => return Err(reading(e)),
+        }
+    }
     // It stays open until the process ends, and is there as long.
     Ok(PathBuf::from(format!("/dev/fd/{}", file.into_raw_fd())))
+}
+
+/// Waits until there is something to read, or the end.
+fn wait(input: &File, path: &Path) -> Result<()> {
+    let a_while = Timespec { tv_sec: 0, tv_nsec: 100_000_000 };
+    loop {
+        if STOP.get().is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+            return Err(Error::interrupted());
+        }
+        match poll(&mut [PollFd::new(input, PollFlags::IN)], Some(&a_while)) {
+            Ok(0) | Err(Errno::INTR) => {}
+            Ok(_) => return Ok(()),
+            Err(e) => return Err(Error::io(path, "wait for it", e.into())),
+        }
+    }
 }
 
 /// A new file in `folder` that has no name.
@@ -164,7 +204,7 @@ fn nameless(folder: &Path) -> io::Result<File> {
                 fs::remove_file(&path)?;
                 return Ok(File::from(file));
             }
-            Err(rustix::io::Errno::EXIST) if attempt < 1_000 => attempt += 1,
+            Err(Errno::EXIST) if attempt < 1_000 => attempt += 1,
             Err(e) => return Err(e.into()),
         }
     }

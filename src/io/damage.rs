@@ -35,6 +35,8 @@ pub struct PartLosses {
     /// The first of them one by one, the last of these with all that are behind it.
     list: Vec<LostPoints>,
     points: u64,
+    /// Places where some are lost: as many as the list has, or more.
+    places: u64,
 }
 
 impl Losses {
@@ -84,6 +86,12 @@ impl Losses {
         lock(&self.by_part).values().map(|part| part.points).sum()
     }
 
+    /// What is told of all that is lost.
+    pub fn told(&self) -> Vec<String> {
+        let places: u64 = lock(&self.by_part).values().map(|part| part.places).sum();
+        told(&self.all(), places + self.at_open.len() as u64)
+    }
+
     /// All that is lost, in the order of the file.
     pub fn all(&self) -> Vec<LostPoints> {
         let by_part = lock(&self.by_part);
@@ -99,6 +107,11 @@ impl PartLosses {
     /// The same, of which nothing is lost yet.
     pub fn again(&self) -> PartLosses {
         PartLosses { on_error: self.on_error, ..PartLosses::default() }
+    }
+
+    /// What is told of it.
+    pub fn told(&self) -> Vec<String> {
+        told(&self.list, self.places)
     }
 
     /// What is lost, in the order of the file.
@@ -132,7 +145,10 @@ impl PartLosses {
         let held = self.list.len();
         match self.list.last_mut() {
             // The same place again.
-            Some(last) if last.byte >= byte => last.points += points,
+            Some(last) if last.byte >= byte => {
+                last.points += points;
+                return Ok(());
+            }
             Some(last) if held >= HELD => {
                 last.points += points;
                 if !last.why.ends_with(BEHIND) {
@@ -141,6 +157,7 @@ impl PartLosses {
             }
             _ => self.list.push(lost(path, byte, points, error.message())),
         }
+        self.places += 1;
         Ok(())
     }
 }
@@ -170,8 +187,8 @@ pub fn lost(path: &Path, byte: u64, points: u64, why: &str) -> LostPoints {
     LostPoints { path, byte, points, why: why.to_owned() }
 }
 
-/// What is told of the losses of one file.
-pub fn told(lost: &[LostPoints]) -> Vec<String> {
+/// What is told of the losses of one file, which are in so many places: those of the list, or more.
+pub fn told(lost: &[LostPoints], places: u64) -> Vec<String> {
     let Some(first) = lost.first() else { return Vec::new() };
     let path = shown(Path::new(&first.path)).to_string();
     let one = |lost: &LostPoints| {
@@ -181,10 +198,13 @@ pub fn told(lost: &[LostPoints]) -> Vec<String> {
     let mut all: Vec<String> = lost.iter().take(TOLD).map(one).collect();
     if lost.len() > 1 {
         let points = lost.iter().map(|lost| lost.points).sum();
-        let (points, places) = (Grouped(points), lost.len());
-        all.push(format!(
-            "{path}: {points} points are lost in {places} places; the report has all"
-        ));
+        let (points, listed) = (Grouped(points), lost.len() as u64);
+        let report = match places > listed {
+            true => format!("the report has the first {} one by one", Grouped(listed)),
+            false => "the report has all".to_owned(),
+        };
+        let places = Grouped(places);
+        all.push(format!("{path}: {points} points are lost in {places} places; {report}"));
     }
     all
 }

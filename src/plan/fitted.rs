@@ -13,7 +13,7 @@ use super::look::{Unfit, look, look_at_corners};
 use super::meshes::{connected, triangulations};
 use super::order::WriteOrder;
 use super::passes::{Passes, unroll};
-use super::places::{all_read, check_places, copies, each_input, splits};
+use super::places::{all_read, check_places, copies, each_input, not_beside, splits};
 use super::sorted::{Sorted, blame};
 use super::stretch::Stretch;
 use super::told::ToldGraph;
@@ -125,7 +125,7 @@ impl Graph {
         let besides = (lists_bytes(&each, &splits, &ranks), connected(&sorted, &*source));
         let demands = divided(demands, besides, tagger.tags())?;
         let mut warnings = warnings(&*source, &sorted, &schemas, &settings)?;
-        warnings.extend(doubt.into_iter().chain(wide));
+        warnings.extend(doubt.into_iter().chain(wide).chain(not_beside(&*source, &sorted.sinks)));
         let task = Task {
             meshes: triangulations(&*source, &sorted, &passes.changed_by)?,
             provenance: told.provenance(&sorted, &order, &settings),

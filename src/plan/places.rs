@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::engine::beside::Beside;
+use crate::engine::beside::{Beside, missing};
 use crate::engine::by_input::ranks;
 use crate::engine::by_split::MOST_FILES;
 use crate::engine::publish::{check_place, folder_of, refuse_existing};
@@ -75,6 +75,12 @@ pub(super) fn copies(
         }
     }
     Ok(copies)
+}
+
+/// What to say of records whose waveforms are not beside them in an output.
+pub(super) fn not_beside(source: &dyn Source, sinks: &[Box<dyn CreateSink>]) -> Vec<String> {
+    let inputs = source.inputs();
+    sinks.iter().filter_map(|sink| missing(&inputs, &**sink)).collect()
 }
 
 fn refuse(clash: &Clash, output: &Path) -> Error {

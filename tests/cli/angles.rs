@@ -151,7 +151,8 @@ fn normals_of_any_format_are_compared_and_sides_counted() {
     assert_eq!(up["first_to_second"]["opposed"], 800);
     assert_eq!(up["first_to_second"]["angles_deg"]["max"], 0.0);
     let said = done(at, &["compare", "flat.ply", "tilted.ply", "--normals"]);
-    let line = "\nnormals    of 1,600 points of the first and the nearest of the second\n  angles   mean 10.0°";
+    let line = "\nnormals    of 1,600 points of the first and the nearest of the second\n  \
+                angles   mean 10.0°";
     assert!(said.contains(line) && said.contains("  sides    0 point to the other side"), "{said}");
 }
 

@@ -63,7 +63,8 @@ fn a_scan_without_colours_is_drawn_and_told_to_be_black() {
         assert!(stdout.contains("pixel      0.00097"), "{stdout}");
         stderr
     };
-    let told = "warning: none.ply: all colours are 0, so that the scan is drawn black: use `--by height` or";
+    let told = "warning: none.ply: all colours are 0, so that the scan is drawn black: use \
+                `--by height` or";
     for by in ["color", "colour"] {
         let stderr = drawn(by);
         assert!(stderr.starts_with(told) && stderr.lines().count() == 1, "{stderr}");

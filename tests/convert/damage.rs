@@ -186,3 +186,25 @@ fn laz_that_counts_fewer_points_than_its_chunks_have_gives_all_of_them() {
     assert_eq!((points("fail"), points("skip")), (1_100, 1_100));
     assert!(points("salvage") >= 1_200);
 }
+
+#[test]
+fn points_of_a_chunk_whose_bytes_do_not_tell_their_number_are_not_made_up() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    // All records are alike: they cost next to no bits.
+    fs::write(at.join("a.csv"), "x,y,z\n".to_owned() + &"1,2,3\n".repeat(70_000)).unwrap();
+    let convert = ["convert", "a.csv", "-o", "old.laz", "--point-format", "0", "--scale", "0.01"];
+    done(at, &[&convert[..], &["--no-provenance", "--quiet"]].concat());
+    let whole = read(&at.join("old.laz")).1;
+    let stride = whole.len() / 70_000;
+    let (told, records, lost) = run(at, &counting(at, "old.laz", 35_000), "salvage");
+    let points = records.len() / stride;
+    assert!(points > 60_000 && points < 70_000, "{points}");
+    assert!(records == whole[..records.len()] && lost.is_empty());
+    let behind = format!("{},{:03} points behind", (points - 35_000) / 1000, points % 1000);
+    assert!(told.contains(&behind), "{told}");
+    assert!(told.contains("the last chunk may have up to "), "{told}");
+    // The header's count is believed where the bytes do not contradict it.
+    let (told, records, _) = run(at, "old.laz", "salvage");
+    assert!(records == whole && !told.contains("points behind"), "{told}");
+}

@@ -131,7 +131,8 @@ fn more_lines_that_are_wrong_than_are_held_are_counted_all_the_same() {
     let line = |n: u32| if n.is_multiple_of(3) { format!("{n} 2 3\n") } else { "?\n".to_owned() };
     fs::write(at.join("a.xyz"), (0..3_000).map(line).collect::<String>()).unwrap();
     let (told, records, lost) = run(at, "a.xyz", "salvage");
-    assert!(told.contains("2,000 points are lost"), "{told}");
+    let all = "2,000 points are lost in 2,000 places; the report has the first 100 one by one";
+    assert!(told.contains(all), "{told}");
     assert_eq!((records.len(), lost.len()), (1_000 * 24, 100));
     assert_eq!(lost.iter().map(|(_, points)| points).sum::<u64>(), 2_000);
 }
@@ -175,4 +176,72 @@ fn lists_of_vertices_that_are_cut_off_end_the_points() {
     assert!(told.contains("are lost"), "{told}");
     assert_eq!(records.len(), 60 * 12);
     assert_eq!(lost.iter().map(|(_, points)| points).sum::<u64>(), 40);
+}
+
+#[test]
+fn columns_that_are_not_read_make_no_line_wrong() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    let text = "1 2 3 roof\n2 3 4 wall\n3 4 x roof\n4 5 6 7\n5 6 7 tree\n";
+    fs::write(at.join("a.txt"), text).unwrap();
+    for how in ["skip", "salvage"] {
+        let convert = ["convert", "a.txt", "-o", "a.ply", "--columns", "x,y,z,_"];
+        let more = ["--on-error", how, "--report", "r.json"];
+        let (code, _, told) = pointmill(at, &[&convert[..], &more].concat());
+        assert_eq!(code, 0, "{told}");
+        assert!(told.contains("1 points are lost") && told.contains("line 3: `x`"), "{told}");
+        let (schema, records) = read(&at.join("a.ply"));
+        assert_eq!(records.len(), 4 * schema.stride);
+    }
+}
+
+#[test]
+fn points_that_a_text_counts_and_does_not_have_are_lost_at_its_end() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    let text = "5\n1 2 3 4\n2 3 4 5\n3 4 5 6\n";
+    fs::write(at.join("a.pts"), text).unwrap();
+    fails(at, &["convert", "a.pts", "-o", "o.ply"], 1, &["has 5 points", "--on-error salvage"]);
+    let (told, records, lost) = run(at, "a.pts", "salvage");
+    assert!(told.contains("2 points are lost: it says that it has 5 points"), "{told}");
+    assert_eq!(lost, [(text.len() as u64, 2)]);
+    assert_eq!(records.len() / read(&at.join("out.ply")).0.stride, 3);
+    // A line that is no point is counted, and lost where it is.
+    fs::write(at.join("b.pts"), "4\n1 2 3 4\n?\n3 4 5 6\n").unwrap();
+    assert_eq!(run(at, "b.pts", "skip").2, [(10, 1), (20, 1)]);
+}
+
+/// A text of 6 points in these lines, the fourth of which stands behind a blank line and is too
+/// long to be read, is read but for that one.
+fn without_the_long_line(at: &Path, name: &str, head: &str, kind: &str) {
+    let lines = ["0 1 2", "1 2 3", "2 3 4", "", "4 5 6", "5 6 7"].map(str::to_owned);
+    let mut lines = Vec::from(lines);
+    lines[3] = format!("\n{}", "1 ".repeat(1_500_000));
+    let text = format!("{}{}\n", head.replace("KIND", kind), lines.join("\n"));
+    fs::write(at.join(name), &text).unwrap();
+    fails(at, &["convert", name, "-o", "o.ply"], 1, &["is longer than", "--on-error salvage"]);
+    let (told, records, lost) = run(at, name, "skip");
+    let byte = text.find("\n\n").unwrap() as u64 + 2;
+    assert_eq!(lost, [(byte, 1)], "{name} {kind}: {told}");
+    assert_eq!(records.len() / read(&at.join("out.ply")).0.stride, 5, "{name} {kind}");
+}
+
+#[test]
+fn lines_that_are_too_long_are_lost_once() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    let property = |axis: &str| format!("property KIND {axis}\n");
+    let ply = format!(
+        "ply\nformat ascii 1.0\nelement vertex 6\n{}end_header\n",
+        ["x", "y", "z"].map(property).concat()
+    );
+    for kind in ["float", "double"] {
+        without_the_long_line(at, "l.ply", &ply, kind);
+    }
+    let pcd = "VERSION 0.7\nFIELDS x y z\nSIZE KIND KIND KIND\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 6\n\
+               HEIGHT 1\nPOINTS 6\nDATA ascii\n";
+    for size in ["4", "8"] {
+        without_the_long_line(at, "l.pcd", pcd, size);
+    }
+    without_the_long_line(at, "l.xyz", "", "");
 }

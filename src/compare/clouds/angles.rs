@@ -55,6 +55,16 @@ impl NormalAngles {
         Some(of(&a.angles_deg?).max(of(&b.angles_deg?)))
     }
 
+    /// Of how many points of both scans, and how many of them have no angle.
+    pub(in crate::compare) fn without(&self) -> [u64; 2] {
+        let both = [self.first_to_second, self.second_to_first];
+        let counts = both.iter().flatten().map(|direction| {
+            let points = direction.angles_deg.map_or(0, |figures| figures.points);
+            [points + direction.without, direction.without]
+        });
+        counts.fold([0; 2], |[all, without], [more, none]| [all + more, without + none])
+    }
+
     fn lines(&self, f: &mut fmt::Formatter<'_>, direction: &NormalDirection) -> fmt::Result {
         let (opposed, without) = (Grouped(direction.opposed), Grouped(direction.without));
         if let Some(figures) = &direction.angles_deg {

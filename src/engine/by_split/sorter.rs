@@ -82,15 +82,19 @@ fn square(position: [f64; 2], side: f64) -> Result<SplitKey> {
 /// The value of a record, which is a whole number.
 fn value(dimension: &Dimension, record: &[u8], endian: Endian) -> Result<SplitKey> {
     let value = dimension.world(record, endian);
-    match value.fract() == 0.0 && value.abs() < FARTHEST {
-        true => Ok([value as i64, 0]),
-        false => {
-            let name = &dimension.name;
-            let told = format!("a point has {name} {value}, which is no whole number");
-            let help = "`write.by` takes a dimension of whole numbers, such as PointSourceId";
-            Err(Error::pipeline(told).help(help))
-        }
-    }
+    let name = &dimension.name;
+    let (told, help) = match value {
+        _ if value.fract() != 0.0 => (
+            format!("a point has {name} {value}, which is no whole number"),
+            "`write.by` takes a dimension of whole numbers, such as PointSourceId",
+        ),
+        _ if value.abs() >= FARTHEST => (
+            format!("a point has {name} {value}, and numbers of files end at 2^52"),
+            "`write.by` takes a dimension of smaller whole numbers, such as PointSourceId",
+        ),
+        _ => return Ok([value as i64, 0]),
+    };
+    Err(Error::pipeline(told).help(help))
 }
 
 /// Where the next record of an output goes, whose places decide.

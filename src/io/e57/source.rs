@@ -11,7 +11,6 @@ use super::names::RECORDS;
 use super::part::E57Part;
 use super::reading::Windowed;
 use crate::error::shown;
-use crate::io::damage::told;
 use crate::io::rows::schema::placed;
 use crate::io::systems;
 use crate::point::names::{POINT_SOURCE_ID, XYZ};
@@ -178,7 +177,7 @@ impl Source for E57Source {
                 format!("{path}: {n} of {points} points are said to have no coordinates")
             })
         };
-        let lost = self.files.iter().flat_map(|file| told(&file.losses.all()));
+        let lost = self.files.iter().flat_map(|file| file.losses.told());
         let found = self.files.iter().filter_map(invalid).chain(lost);
         self.warnings.iter().cloned().chain(found).collect()
     }

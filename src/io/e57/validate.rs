@@ -5,7 +5,7 @@ use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
-use e57::PointCloud;
+use e57::{PointCloud, RecordDataType, RecordName};
 
 use super::file::{E57Scan, reader};
 use super::names::{CALLED, MAGIC};
@@ -170,11 +170,26 @@ fn axes(scan: &PointCloud) -> impl Iterator<Item = (usize, [f64; 2])> {
     axes.filter_map(|(axis, (low, high))| Some((axis, [low?, high?])))
 }
 
-/// Holds the points of a scan that were read to its bounds, but for what single precision rounds.
+/// Half of the largest scale of coordinates that are whole numbers of steps: bounds may be those of
+/// what was rounded to these.
+fn half_step(scan: &PointCloud) -> f64 {
+    let coordinates = scan.prototype.iter().filter(|record| {
+        use RecordName::{CartesianX, CartesianY, CartesianZ};
+        matches!(record.name, CartesianX | CartesianY | CartesianZ)
+    });
+    let scales = coordinates.filter_map(|record| match record.data_type {
+        RecordDataType::ScaledInteger { scale, .. } => Some(scale.abs()),
+        _ => None,
+    });
+    scales.fold(0.0, f64::max) / 2.0
+}
+
+/// Holds the points of a scan that were read to its bounds, but for what single precision and the
+/// steps of coordinates round.
 fn of_points(scan: &E57Scan, findings: &mut Findings) {
     let Some([lowest, highest]) = *lock(&scan.seen) else { return };
     for (axis, [low, high]) in axes(&scan.cloud) {
-        let slack = f64::from(f32::EPSILON) * low.abs().max(high.abs());
+        let slack = f64::from(f32::EPSILON) * low.abs().max(high.abs()) + half_step(&scan.cloud);
         let (least, most) = (lowest[axis], highest[axis]);
         if low <= high && (least < low - slack || most > high + slack) {
             let (name, number) = (AXES[axis], scan.number);

@@ -28,10 +28,18 @@ impl Mending {
         self.on_error != OnError::Fail && error.kind() == ErrorKind::Data
     }
 
+    /// `error`, with the advice to salvage what can be read where that is not done already.
+    pub fn advised(&self, error: Error) -> Error {
+        match self.on_error {
+            OnError::Salvage => error,
+            OnError::Fail | OnError::Skip => advised(error),
+        }
+    }
+
     /// Goes on behind `error`, which is told, if that is wanted; else fails with it.
     pub fn tell(&mut self, error: Error) -> Result<()> {
         if !self.mends(&error) {
-            return Err(advised(error));
+            return Err(self.advised(error));
         }
         self.warnings.push(error.to_string());
         Ok(())
@@ -41,7 +49,7 @@ impl Mending {
     /// which says why they are lost.
     pub fn lose(&mut self, file: &InputFile, byte: u64, points: u64, error: Error) -> Result<()> {
         if !self.mends(&error) {
-            return Err(advised(error));
+            return Err(self.advised(error));
         }
         self.lost.push(lost(file.path(), byte, points, error.message()));
         Ok(())

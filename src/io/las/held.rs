@@ -7,13 +7,32 @@ use super::header::Header;
 use super::laz::{Compression, Compressor, Decoder};
 use crate::Result;
 
+/// How many points there are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct HeldPoints {
+    /// So many at least.
+    pub least: u64,
+    /// So many at most: the same where the chunks tell it.
+    pub most: u64,
+}
+
+impl HeldPoints {
+    fn exactly(points: u64) -> HeldPoints {
+        HeldPoints { least: points, most: points }
+    }
+}
+
 /// The points of all chunks that the chunk table of `file` has; None where it has no table that can
 /// be used, or a chunk does not say how many points it has and its bytes do not either.
 ///
 /// # Errors
 ///
 /// What the system refuses to read.
-pub fn held(file: &InputFile, header: &Header, compression: &Compression) -> Result<Option<u64>> {
+pub fn held(
+    file: &InputFile,
+    header: &Header,
+    compression: &Compression,
+) -> Result<Option<HeldPoints>> {
     let start = u64::from(header.offset_to_point_data);
     if compression.compressor == Compressor::PointWise || start > file.len() {
         return Ok(None);
@@ -33,32 +52,41 @@ pub fn held(file: &InputFile, header: &Header, compression: &Compression) -> Res
     });
     let (Ok(()), Some((from, to, full))) = (found, last) else { return Ok(None) };
     if compression.chunk_points.is_none() {
-        return Ok(Some(points));
+        return Ok(Some(HeldPoints::exactly(points)));
     }
     let in_last = match compression.compressor {
         Compressor::Layered => {
-            layered_head(file, from, to, compression).ok().map(|head| head.points)
+            let head = layered_head(file, from, to, compression).ok();
+            head.map(|head| HeldPoints::exactly(head.points))
         }
         _ => decoded(file, compression, (from, to), full),
     };
-    Ok(in_last.filter(|n| *n <= full).map(|n| points - full + n))
+    let before = points - full;
+    Ok(in_last.filter(|last| last.most <= full).map(|HeldPoints { least, most }| HeldPoints {
+        least: before + least,
+        most: before + most,
+    }))
 }
 
-/// The points of a chunk that says nothing of them: as many as it takes to come to its end.
+/// The points of a chunk that says nothing of them: as many as it takes to come to its end. Where
+/// records are alike they cost next to no bits, and the end may be that of several counts.
 fn decoded(
     file: &InputFile,
     compression: &Compression,
     (from, to): (u64, u64),
     most: u64,
-) -> Option<u64> {
+) -> Option<HeldPoints> {
     let mut decoder = Decoder::new(compression, file);
     let mut record = vec![0; compression.stride];
     decoder.begin(from, to);
+    let mut found: Option<HeldPoints> = None;
     for points in 1..=most {
-        decoder.read(&mut record).ok()?;
+        if decoder.read(&mut record).is_err() {
+            break;
+        }
         if decoder.finish().is_ok() {
-            return Some(points);
+            found.get_or_insert(HeldPoints::exactly(points)).most = points;
         }
     }
-    None
+    found
 }

@@ -39,6 +39,7 @@ mod registered;
 mod reshaped;
 pub(crate) mod sink;
 mod source;
+mod storage;
 mod system;
 mod table;
 mod target;

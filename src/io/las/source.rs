@@ -351,7 +351,8 @@ impl Source for LasSource {
     fn warnings(&self) -> Vec<String> {
         let rounded = |file: &Opened| file.to_one_form.as_ref()?.told(&file.input.path);
         let told = |file: &Opened| {
-            let lost = damage::told(&file.evidence.lost());
+            let lost = file.evidence.lost();
+            let lost = damage::told(&lost, lost.len() as u64);
             lost.into_iter().chain(file.evidence.warnings()).chain(rounded(file))
         };
         self.warnings.iter().cloned().chain(self.files.iter().flat_map(told)).collect()

@@ -117,10 +117,18 @@ impl PcdPart<'_> {
         let (own, stride, mut read) = (self.own, self.schema.stride, 0);
         while read < points && self.left > 0 {
             let Points::Ascii(ascii) = &mut self.points else { break };
-            let (at, before) = (ascii.lines.at(), ascii.lines.number());
+            let at = ascii.lines.at();
             let record = &mut batch.records_mut()[read * stride..(read + 1) * stride];
             let mut gone = 1;
-            match ascii.point(self.file, self.cell, record) {
+            let point = match ascii.lines.next_or_error(self.losses.1.mends()) {
+                Ok(Some(line)) => ascii.point(self.file, line, record),
+                Ok(None) => {
+                    gone = self.left;
+                    Err(ended(self.file, self.cell, ascii.lines.length()))
+                }
+                Err(error) => Err(error),
+            };
+            match point {
                 Ok(()) => {
                     if self.file.is_grid() {
                         record[own..own + 8].copy_from_slice(&self.file.place(self.cell));
@@ -128,9 +136,6 @@ impl PcdPart<'_> {
                     read += 1;
                 }
                 Err(error) => {
-                    if ascii.lines.number() == before && !ascii.lines.pass_over()? {
-                        gone = self.left;
-                    }
                     let byte = error.byte().unwrap_or(at);
                     self.losses.1.lose(&self.file.path, byte, gone, error)?;
                 }
@@ -178,16 +183,23 @@ fn read_at(pcd: &PcdFile, file: &File, at: &mut u64, into: &mut [u8]) -> Result<
     Ok(())
 }
 
+/// The error of a text that ends at byte `length`, after the lines of so many cells.
+fn ended(file: &PcdFile, cells: u64, length: u64) -> Error {
+    let told = format!("the file ends after {cells} of {} points", file.header.points);
+    Error::data(&file.path, told)
+        .at_byte(length)
+        .help("the file is cut short, or its header is wrong")
+}
+
 impl AsciiPoints<'_> {
-    /// Reads the next line, which is that of a cell, into a record.
-    fn point(&mut self, file: &PcdFile, cell: u64, record: &mut [u8]) -> Result<()> {
+    /// Reads the numbers of a line into a record.
+    fn point(
+        &mut self,
+        file: &PcdFile,
+        (start, end): (usize, usize),
+        record: &mut [u8],
+    ) -> Result<()> {
         let path = &file.path;
-        let Some((start, end)) = self.lines.next()? else {
-            let told = format!("the file ends after {cell} of {} points", file.header.points);
-            return Err(Error::data(path, told)
-                .at_byte(self.lines.length())
-                .help("the file is cut short, or its header is wrong"));
-        };
         let line = self.lines.text(start, end);
         let number = self.lines.number();
         let fail = |told: String, place: usize| {
@@ -224,8 +236,8 @@ impl AsciiPoints<'_> {
 
     /// True if a coordinate has more digits than the 4 bytes of its type hold. What is wrong with a
     /// line is told when it is read.
-    pub fn outgrow_float(mut self, axes: &[usize]) -> Result<bool> {
-        while let Some((start, end)) = self.lines.next()? {
+    pub fn outgrow_float(mut self, axes: &[usize], mut lost: PartLosses) -> Result<bool> {
+        while let Some((start, end)) = self.lines.next_whole(&mut lost)? {
             let line = self.lines.text(start, end);
             let mut fields = Fields::new(line, Delimiter::blanks_or_commas(line));
             for n in 0..=axes.last().copied().unwrap_or(0) {

@@ -8,7 +8,6 @@ use super::header::{LONGEST_LINE, PcdData, PcdField};
 use super::lzf::Unpacker;
 use super::part::{AsciiPoints, PcdPart, Points};
 use crate::error::shown;
-use crate::io::damage::told;
 use crate::io::rows::comments::Said;
 use crate::io::rows::lines::Lines;
 use crate::io::rows::parts::PartEnds;
@@ -97,7 +96,7 @@ fn needs_double(files: &[PcdFile]) -> Result<bool> {
         is_double |= !of(Scalar::F64).is_empty();
         let floats = of(Scalar::F32);
         if !floats.is_empty() && !is_double {
-            is_double |= ascii(file, false)?.outgrow_float(&floats)?;
+            is_double |= ascii(file, false)?.outgrow_float(&floats, file.losses.part())?;
         }
     }
     Ok(is_double)
@@ -233,7 +232,7 @@ impl Source for PcdSource {
     }
 
     fn warnings(&self) -> Vec<String> {
-        let lost = self.files.iter().flat_map(|file| told(&file.losses.all()));
+        let lost = self.files.iter().flat_map(|file| file.losses.told());
         self.files.iter().flat_map(PcdFile::warnings).chain(lost).collect()
     }
 

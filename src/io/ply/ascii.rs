@@ -93,8 +93,8 @@ impl<'a> AsciiPart<'a> {
     /// passed over, if that is wanted.
     fn vertex(&mut self, record: &mut [u8]) -> Result<bool> {
         while self.left > 0 {
-            let (at, before) = (self.lines.at(), self.lines.number());
-            let error = match self.lines.next() {
+            let at = self.lines.at();
+            let error = match self.lines.next_or_error(self.losses.mends()) {
                 Ok(Some(line)) => match self.numbers(line, record) {
                     Ok(()) => {
                         self.left -= 1;
@@ -114,10 +114,6 @@ impl<'a> AsciiPart<'a> {
             let byte = error.byte().unwrap_or(at);
             self.losses.lose(self.path, byte, 1, error)?;
             self.left -= 1;
-            // One that is too long was not read.
-            if self.lines.number() == before {
-                self.lines.pass_over()?;
-            }
         }
         Ok(false)
     }
@@ -187,7 +183,9 @@ impl AsciiPart<'_> {
     pub fn outgrows_float(mut self, columns: &[usize]) -> Result<bool> {
         self.skip()?;
         for _ in 0..self.points {
-            let Some((start, end)) = self.lines.next()? else { return Ok(false) };
+            let Some((start, end)) = self.lines.next_whole(&mut self.losses)? else {
+                return Ok(false);
+            };
             let line = self.lines.text(start, end);
             let mut words = Fields::new(line, Delimiter::Blanks);
             for n in 0..=columns.last().copied().unwrap_or(0) {

@@ -8,7 +8,6 @@ use super::ascii::AsciiPart;
 use super::binary::{BinaryPart, ListedPart};
 use super::file::PlyFile;
 use super::header::Element;
-use crate::io::damage::told;
 use crate::io::origin::Origin;
 use crate::io::rows::Encoding;
 use crate::io::rows::lines::shown;
@@ -297,7 +296,7 @@ impl Source for PlySource {
 
     fn warnings(&self) -> Vec<String> {
         let found = self.files.iter().filter_map(PlyFile::rounded);
-        let lost = self.files.iter().flat_map(|file| told(&file.losses.all()));
+        let lost = self.files.iter().flat_map(|file| file.losses.told());
         self.warnings.iter().cloned().chain(found).chain(lost).collect()
     }
 

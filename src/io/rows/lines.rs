@@ -6,7 +6,8 @@ use std::path::Path;
 
 use memchr::memchr2;
 
-use crate::{Error, Result};
+use crate::io::damage::PartLosses;
+use crate::{Error, ErrorKind, Result};
 
 /// Bytes read at once.
 const WINDOW: usize = 1 << 18;
@@ -121,9 +122,35 @@ impl<'a> Lines<'a> {
         }
     }
 
+    /// As [`next`](Self::next). If it `mends`, a line that is too long is passed over: its error is
+    /// given all the same, and the line behind it is the next.
+    pub fn next_or_error(&mut self, mends: bool) -> Result<Option<(usize, usize)>> {
+        let line = self.next();
+        if line.as_ref().is_err_and(|error| mends && error.kind() == ErrorKind::Data) {
+            self.pass(true)?;
+        }
+        line
+    }
+
+    /// As [`next`](Self::next), but for lines that are too long: each is lost as one point, if that
+    /// is wanted.
+    pub fn next_whole(&mut self, lost: &mut PartLosses) -> Result<Option<(usize, usize)>> {
+        loop {
+            let at = self.at();
+            match self.next_or_error(lost.mends()) {
+                Err(error) => lost.lose(self.path, error.byte().unwrap_or(at), 1, error)?,
+                line => return line,
+            }
+        }
+    }
+
     /// Passes over a line with something on it, however long; false at the file's end.
     pub fn pass_over(&mut self) -> Result<bool> {
-        let mut written = false;
+        self.pass(false)
+    }
+
+    /// The same; if something is known to be `written` on the next line, over that one.
+    fn pass(&mut self, mut written: bool) -> Result<bool> {
         loop {
             if self.start == self.end {
                 if self.at_end() {

@@ -8,9 +8,9 @@ use super::columns::{dimensions, guessed, scalar};
 use super::head::{TextHead, without_mark};
 use super::names::{LONGEST_LINE, RECORDS};
 use super::ptx::{self, PtxScan, PtxText};
-use super::survey::{CORRECT, TextStretch, TextSurvey, belied, few, next, no_number, survey};
+use super::survey::{CORRECT, TextStretch, TextSurvey, belied, few, no_number, survey};
 use crate::error::shown;
-use crate::io::damage::{Losses, PartLosses, told};
+use crate::io::damage::{Losses, PartLosses};
 use crate::io::origin::Origin;
 use crate::io::rows::facts::ColumnFacts;
 use crate::io::rows::fields::{Delimiter, Fields, is_comment, is_count};
@@ -98,9 +98,10 @@ impl TextFile {
         };
         // Lines that are wrong are to be known before they are read.
         let all = keys.on_error != OnError::Fail;
-        let looks = (0..head.columns).map(|n| all || looks(n)).collect();
+        let is_read = |n: usize| named.as_ref().is_none_or(|named| named[n].is_some());
+        let looks = (0..head.columns).map(|n| looks(n) || all && is_read(n)).collect();
         let lost = Losses::new(keys.on_error).part();
-        let found = survey(origin.reopen()?, path, length, &head, looks, lost)?;
+        let mut found = survey(origin.reopen()?, path, length, &head, looks, lost)?;
         let mut warnings = Vec::new();
         let columns = match named {
             Some(named) => named,
@@ -110,7 +111,7 @@ impl TextFile {
                 names.into_iter().map(|name| Some(name.to_owned())).collect()
             }
         };
-        let belied = belied(path, length, &found)?;
+        let belied = belied(path, length, &mut found)?;
         let (path, origin) = (path.to_owned(), origin.clone());
         let separator = head.separator;
         Ok(TextFile {
@@ -266,7 +267,7 @@ impl Source for TextSource {
     }
 
     fn warnings(&self) -> Vec<String> {
-        let lost = |file: &TextFile| told(file.found.lost.list());
+        let lost = |file: &TextFile| file.found.lost.told();
         self.files.iter().flat_map(|file| file.warnings.iter().cloned().chain(lost(file))).collect()
     }
 
@@ -325,7 +326,7 @@ impl TextPart<'_> {
     /// Reads the next point.
     fn point(&mut self, record: &mut [u8]) -> Result<()> {
         loop {
-            let Some((start, end)) = next(&mut self.lines, &self.file.path, &mut self.lost)? else {
+            let Some((start, end)) = self.lines.next_whole(&mut self.lost)? else {
                 let told = "the file has fewer points than when it was looked through";
                 return Err(Error::data(&self.file.path, told).at_byte(self.lines.length()));
             };

@@ -135,33 +135,24 @@ pub(super) fn no_number(path: &Path, line: u64, column: usize, field: &[u8]) -> 
     Error::data(path, told).help(CORRECT)
 }
 
-/// What a text says of the number of its points, if it has more; fewer are an error.
-pub(super) fn belied(path: &Path, length: u64, found: &TextSurvey) -> Result<Option<String>> {
+/// What a text says of the number of its points, if it has more.
+///
+/// # Errors
+///
+/// If it has fewer, unless it is read without those that are missing: they are lost at its end.
+pub(super) fn belied(path: &Path, length: u64, found: &mut TextSurvey) -> Result<Option<String>> {
     let (points, claimed) = (found.points, found.claimed.unwrap_or(found.points));
-    if claimed > points + found.lost.points() {
+    let missing = claimed.saturating_sub(points + found.lost.points());
+    if missing > 0 {
         let told = format!("it says that it has {claimed} points, and ends after {points}");
-        return Err(Error::data(path, told)
+        let error = Error::data(path, told)
             .at_byte(length)
-            .help("the file is cut short, or the number is wrong: correct it"));
+            .help("the file is cut short, or the number is wrong: correct it");
+        found.lost.lose(path, length, missing, error)?;
+        return Ok(None);
     }
     let told = || format!("it says that it has {claimed} points, and has {points}");
     Ok((claimed < points).then(told))
-}
-
-/// The next line with something on it; one that is too long is passed over and lost.
-pub(super) fn next(
-    lines: &mut Lines<'_>,
-    path: &Path,
-    lost: &mut PartLosses,
-) -> Result<Option<(usize, usize)>> {
-    loop {
-        let at = lines.at();
-        match lines.next() {
-            Err(error) => lost.lose(path, at, 1, error)?,
-            line => return line,
-        }
-        lines.pass_over()?;
-    }
 }
 
 /// Looks through a text that begins with `head`; `looks` says at which of its columns. What is
@@ -182,7 +173,8 @@ pub(super) fn survey(
     let mut lines = Lines::new(file, path, [head.body, length], head.lines, LONGEST_LINE);
     let mut surveyor = Surveyor::new(path, head.separator, looks);
     let mut claimed: Option<u64> = None;
-    while let Some((start, end)) = next(&mut lines, path, &mut lost)? {
+    let mut before = Vec::new();
+    while let Some((start, end)) = lines.next_whole(&mut lost)? {
         let (text, at) = (lines.text(start, end), lines.byte(start));
         let text = super::head::without_mark(text, at);
         if is_comment(text).is_some() {
@@ -195,10 +187,12 @@ pub(super) fn survey(
         }
         surveyor.begin(at, lines.number() - 1, 0, 0, false);
         // A line that is passed over says nothing of the columns.
-        let before = lost.mends().then(|| surveyor.facts.clone());
+        if lost.mends() {
+            before.clone_from(&surveyor.facts);
+        }
         if let Err(error) = surveyor.add(text, lines.number(), at) {
             lost.lose(path, at, 1, error)?;
-            surveyor.facts = before.unwrap_or_default();
+            surveyor.facts.clone_from(&before);
         }
     }
     Ok(TextSurvey { lost, ..surveyor.finish(length, claimed) })

@@ -181,6 +181,7 @@ fn look(
     let is_described = |index: usize| {
         let number = (WAVEFORM_RECORDS + index) as u16;
         input.vlrs.iter().any(|vlr| vlr.is(SPECIFICATION, number))
+            || input.evlrs.iter().any(|evlr| evlr.is(SPECIFICATION, number))
     };
     all.usual.tell(&input.header, all.times, is_described, findings);
     if all.has_byte_colors() {

@@ -208,7 +208,9 @@ fn offsets(header: &Header, findings: &mut Findings) {
     for ((offset, scale), axis) in each {
         let steps = offset / scale;
         let rest = (offset - steps.round() * scale).abs();
-        if steps.is_finite() && rest > 1e-7 {
+        // Behind the decimals that a double holds at the offset nothing is told.
+        let ulp = offset.abs() * f64::EPSILON;
+        if steps.is_finite() && rest > scale.abs() * 1e-3 + 2.0 * ulp {
             findings.whole(&OFFSET_STEPS, format!("{axis} of {offset} in steps of {scale}"));
         }
     }
