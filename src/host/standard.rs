@@ -97,18 +97,23 @@ pub fn check_output() -> Result<()> {
     }
 }
 
-/// Copies a file to standard output. A reader who has gone wants no more: that is no error.
+/// Copies a file to standard output.
 ///
 /// # Errors
 ///
-/// What the system refuses.
+/// What the system refuses, and a reader who has gone: what it got is no whole file, and who stands
+/// behind it may not know.
 pub fn send(file: &Path) -> Result<()> {
     let failed = |e| Error::io(STANDARD_OUTPUT, "write to it", e);
     let mut from = File::open(file).map_err(|e| Error::io(file, "read it again", e))?;
     let out = io::stdout().as_fd().try_clone_to_owned().map_err(failed)?;
     match io::copy(&mut from, &mut File::from(out)) {
-        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => Err(failed(e)),
-        _ => Ok(()),
+        Ok(_) => Ok(()),
+        Err(e) if e.kind() == io::ErrorKind::BrokenPipe => {
+            let told = "its reader has gone before all was written: what it got is cut off";
+            Err(Error::new(ErrorKind::Io, told).at(STANDARD_OUTPUT))
+        }
+        Err(e) => Err(failed(e)),
     }
 }
 

@@ -12,7 +12,7 @@ pub(crate) use asked::AskedValues;
 use asked::SCALE;
 pub(super) use asked::TYPES;
 use columns::{BLOCK, ColumnStep, RecordBytes, TargetBytes};
-use step::{Move, is_single, push, slack, step};
+use step::{Move, is_single, push, rounding, slack, step};
 pub(super) use told::{check_drop, quoted};
 use told::{kept_otherwise, placed, room};
 
@@ -287,15 +287,10 @@ impl Projection {
                 let world = from.world(record, endian);
                 let (stored, back) = nearest(to, world);
                 let is_beyond = world.is_finite() && !back.is_finite();
-                if !is_beyond && to.put(target, self.to_endian, stored) {
-                    // What the arithmetic of scales and offsets rounds is not the point's place.
-                    let largest = world.abs().max(from.origin.abs()).max(to.origin.abs());
-                    let rounded = (back - world).abs();
-                    let same = is_single(from) && back as f32 == world as f32;
-                    let told = rounded > 4.0 * f64::EPSILON * largest && !same;
-                    return Ok(if told { rounded } else { 0.0 });
+                match !is_beyond && to.put(target, self.to_endian, stored) {
+                    true => Ok(rounding(from, to, world, back)),
+                    false => Err(UnfitValue { to, value: Value::Double(world) }),
                 }
-                Err(UnfitValue { to, value: Value::Double(world) })
             }
             Move::Exact { from, to } => {
                 let world = from.world(record, endian);

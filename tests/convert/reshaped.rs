@@ -70,7 +70,7 @@ fn dimensions_get_other_names() {
 fn names_that_cannot_be_are_refused() {
     let at = folder();
     for (map, part) in [
-        ("Amplitud=x", "did you mean `amplitude`?"),
+        ("Amplitud=amp", "did you mean `amplitude`?"),
         ("X=x", "coordinates keep their names"),
         ("amplitude=Z", "coordinates keep their names"),
         ("amplitude=a,quality=a", "another entry has one of the two names"),

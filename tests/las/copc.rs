@@ -212,7 +212,7 @@ fn what_copc_cannot_be_is_refused() {
     fails(at, &ordered, 2, &["--order", "order of its own"]);
     fails(at, &["reduce", "a.laz", "--outdir", "o", "--to", "copc"], 2, &["one file", "laz"]);
     let run = |text: &str, parts: &[&str]| fails(at, &["run", text], 2, parts);
-    run("read a.laz ! write \"{x}_{y}.copc.laz\" side=100", &["as one file, not as squares"]);
+    run("read a.laz ! write \"{x}_{y}.copc.laz\" side=100", &["as one file, not as several"]);
     let smooth = "read a.laz ! normals ! smooth ! write s.copc.laz";
     let (code, _, told) = pointmill(at, &["run", smooth]);
     assert_eq!(code, 2, "{told}");

@@ -79,6 +79,15 @@ pub(super) fn is_single(from: &Dimension) -> bool {
     from.scalar == Scalar::F32 && from.scale == 1.0 && from.origin == 0.0
 }
 
+/// How far the world value `back` of the target is from the source's, where that is to be told.
+pub(super) fn rounding(from: &Dimension, to: &Dimension, world: f64, back: f64) -> f64 {
+    // What the arithmetic of scales and offsets rounds is not the point's place.
+    let largest = world.abs().max(from.origin.abs()).max(to.origin.abs());
+    let rounded = (back - world).abs();
+    let same = is_single(from) && back as f32 == world as f32;
+    if rounded > 4.0 * f64::EPSILON * largest && !same { rounded } else { 0.0 }
+}
+
 /// How far the target's value may be from the source's where the target must hold it: half a step
 /// for scan angles, whose whole degrees are steps of 0.006° in newer point formats of LAS and none
 /// of them exactly. They are the same whole degrees again when they come back.
