@@ -289,8 +289,8 @@ pub(crate) fn others_of_split(create: &dyn CreateSink, written: &[PathBuf]) -> O
     };
     let first: Vec<String> = others.iter().take(3).map(|path| shown(path).to_string()).collect();
     Some(format!(
-        "{}{more} were there before and are not of this run: remove them if they are of an earlier \
-         one",
+        "files of another run are left beside those of this one: {}{more}; remove them if they are \
+         of an earlier split",
         first.join(", ")
     ))
 }

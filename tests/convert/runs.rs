@@ -362,3 +362,35 @@ fn plan_tells_what_a_run_would_do_and_does_none_of_it() {
     fails(at, &plan(&["--memory", "10MiB"]), 1, &parts);
     assert_holds(at, &["a.las", "p.toml"]);
 }
+
+#[test]
+fn files_that_an_earlier_split_left_are_told() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    std::fs::write(at.join("two.xyz"), "1 2 3\n200 2 3\n").unwrap();
+    std::fs::write(at.join("one.xyz"), "1 2 3\n").unwrap();
+    std::fs::create_dir(at.join("tiles")).unwrap();
+    for (scan, is_told) in [("two", false), ("one", true)] {
+        let line = format!("read {scan}.xyz columns=x,y,z ! write tiles/{{x}}_{{y}}.csv side=100");
+        let (code, _, told) = crate::support::command::pointmill(
+            at,
+            &["run", &line, "--set", "run.existing=replace"],
+        );
+        assert_eq!(code, 0, "{told}");
+        assert_eq!(told.contains("beside those of this one: tiles/200_0.csv;"), is_told, "{told}");
+    }
+}
+
+#[test]
+fn waveforms_have_no_copy_beside_standard_output() {
+    let at = tempfile::tempdir().unwrap();
+    for name in ["22-ext-waveform.las", "22-ext-waveform.wdp"] {
+        std::fs::copy(crate::support::case_file(name), at.path().join(name)).unwrap();
+    }
+    let convert = ["convert", "22-ext-waveform.las", "-o", "-", "--to", "las"];
+    let output = crate::support::command::command(at.path(), &convert).output().unwrap();
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && output.stdout.starts_with(b"LASF"), "{told}");
+    assert!(told.contains("records of standard output refer to waveforms in "), "{told}");
+    assert!(!std::path::Path::new("/dev/stdout.wdp").exists());
+}
