@@ -13,7 +13,7 @@ use super::extras;
 use super::fields::encoding;
 use super::file::InputFile;
 use super::format::{has_waveforms, record_size, reformed};
-use super::found;
+use super::found::{self, smallest, whole_steps};
 use super::header::Header;
 use super::input::{LasInput, extra_len};
 use super::union::described;
@@ -21,10 +21,6 @@ use super::vlr::{Evlr, Vlr};
 use crate::quantity::Setting;
 use crate::stage::{Assumption, OnError, ReadKeys};
 use crate::{Error, Result};
-
-/// Offsets whose distance is this close to whole steps differ by whole steps: decimal offsets are
-/// seldom exact in binary.
-const WHOLE: f64 = 1e-6;
 
 /// What inputs are brought to, where they differ.
 #[derive(Debug, Clone, Default)]
@@ -149,19 +145,6 @@ impl OneForm {
     }
 }
 
-/// The steps of `scale` from one offset to another, if they are whole and stored coordinates, which
-/// are i32, can move by them.
-pub fn whole_steps(from: f64, to: f64, scale: f64) -> Option<i64> {
-    if from == to {
-        return Some(0);
-    }
-    let steps = (to - from) / scale;
-    let whole = steps.round();
-    let rounding = 4.0 * f64::EPSILON * (from.abs().max(to.abs()) / scale).abs();
-    let near = (steps - whole).abs() <= WHOLE + rounding && whole.abs() < 2f64.powi(32);
-    near.then_some(whole as i64)
-}
-
 /// Makes `header` one of records of `format`, `stride` bytes long: a version of LAS that has it
 /// (LAS 1.4 R15, section 2.6, and the versions before).
 pub fn reform(header: &mut Header, format: u8, stride: usize) {
@@ -189,12 +172,6 @@ pub fn reform(header: &mut Header, format: u8, stride: usize) {
     }
 }
 
-/// The smallest offset of all on each axis.
-pub fn smallest<'a>(headers: impl Iterator<Item = &'a Header>) -> [f64; 3] {
-    let least = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|axis| a[axis].min(b[axis]));
-    headers.map(Header::offset).reduce(least).unwrap_or_default()
-}
-
 fn are_whole_steps(from: [f64; 3], header: &Header, scale: [f64; 3]) -> bool {
     let offset = header.offset();
     (0..3).all(|axis| whole_steps(from[axis], offset[axis], scale[axis]).is_some())
@@ -204,19 +181,6 @@ fn are_whole_steps(from: [f64; 3], header: &Header, scale: [f64; 3]) -> bool {
 fn same_scale(headers: &[Header]) -> Option<[f64; 3]> {
     let scale = headers[0].scale();
     headers.iter().all(|header| header.scale() == scale).then_some(scale)
-}
-
-/// The smallest point format that has the fields of both, if there is one.
-pub fn holding(one: u8, two: u8) -> Option<u8> {
-    let fields = |format: u8| -> Vec<String> {
-        let schema = super::format::schema(format, &[], 0, [1.0; 3], [0.0; 3]);
-        schema.dimensions.into_iter().map(|dimension| dimension.name).collect()
-    };
-    let (one, two) = (fields(one), fields(two));
-    (0..=10).find(|&format| {
-        let own = fields(format);
-        one.iter().chain(&two).all(|name| own.contains(name))
-    })
 }
 
 /// What helps where the scales or offsets of two inputs differ.
@@ -235,25 +199,5 @@ pub fn help(one: &LasInput, two: &LasInput) -> String {
             format!("give `read.scale = {:?}`, the finer of both", finer[0])
         }
         false => format!("give `read.scale = {finer:?}`, the finer of both"),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_smallest_format_that_holds_two() {
-        for (one, two, both) in [
-            (0, 1, Some(1)),
-            (1, 2, Some(3)),
-            (3, 3, Some(3)),
-            (6, 7, Some(7)),
-            (8, 6, Some(8)),
-            (4, 2, Some(5)),
-            (9, 8, Some(10)),
-        ] {
-            assert_eq!((holding(one, two), holding(two, one)), (both, both), "{one} {two}");
-        }
     }
 }

@@ -7,9 +7,12 @@
 
 use std::path::PathBuf;
 
-use super::form::{holding, smallest, whole_steps};
 use super::header::Header;
 use crate::{Error, Result};
+
+/// Offsets whose distance is this close to whole steps differ by whole steps: decimal offsets are
+/// seldom exact in binary.
+const WHOLE: f64 = 1e-6;
 
 /// Digits behind the point that are told apart.
 const MOST_DECIMALS: i32 = 15;
@@ -63,6 +66,38 @@ pub fn point_format(headers: &[Header]) -> Option<u8> {
     let mut formats = headers.iter().map(Header::format);
     let first = formats.next()?;
     formats.try_fold(first, holding)
+}
+
+/// The smallest point format that has the fields of both, if there is one.
+pub fn holding(one: u8, two: u8) -> Option<u8> {
+    let fields = |format: u8| -> Vec<String> {
+        let schema = super::format::schema(format, &[], 0, [1.0; 3], [0.0; 3]);
+        schema.dimensions.into_iter().map(|dimension| dimension.name).collect()
+    };
+    let (one, two) = (fields(one), fields(two));
+    (0..=10).find(|&format| {
+        let own = fields(format);
+        one.iter().chain(&two).all(|name| own.contains(name))
+    })
+}
+
+/// The smallest offset of all on each axis.
+pub fn smallest<'a>(headers: impl Iterator<Item = &'a Header>) -> [f64; 3] {
+    let least = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|axis| a[axis].min(b[axis]));
+    headers.map(Header::offset).reduce(least).unwrap_or_default()
+}
+
+/// The steps of `scale` from one offset to another, if they are whole and stored coordinates, which
+/// are i32, can move by them.
+pub fn whole_steps(from: f64, to: f64, scale: f64) -> Option<i64> {
+    if from == to {
+        return Some(0);
+    }
+    let steps = (to - from) / scale;
+    let whole = steps.round();
+    let rounding = 4.0 * f64::EPSILON * (from.abs().max(to.abs()) / scale).abs();
+    let near = (steps - whole).abs() <= WHOLE + rounding && whole.abs() < 2f64.powi(32);
+    near.then_some(whole as i64)
 }
 
 fn too_fine(paths: &[PathBuf]) -> Error {
@@ -142,6 +177,21 @@ mod tests {
             (&[0.01], &[1.6e23, -1.6e23], None),
         ] {
             assert_eq!(common_step(scales, offsets), step, "{scales:?} {offsets:?}");
+        }
+    }
+
+    #[test]
+    fn the_smallest_format_that_holds_two() {
+        for (one, two, both) in [
+            (0, 1, Some(1)),
+            (1, 2, Some(3)),
+            (3, 3, Some(3)),
+            (6, 7, Some(7)),
+            (8, 6, Some(8)),
+            (4, 2, Some(5)),
+            (9, 8, Some(10)),
+        ] {
+            assert_eq!((holding(one, two), holding(two, one)), (both, both), "{one} {two}");
         }
     }
 }

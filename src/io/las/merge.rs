@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 
 use super::extra::Descriptor;
 use super::fields::encoding;
-use super::form::{OneForm, help, holding, smallest, whole_steps};
+use super::form::{OneForm, help};
 use super::format::{has_gps_time, has_waveforms};
+use super::found::{holding, smallest, whole_steps};
 use super::header::Header;
 use super::input::LasInput;
 use super::native::Native;

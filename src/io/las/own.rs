@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::form::whole_steps;
+use super::found::whole_steps;
 use super::native::Native;
 use super::read::Shift;
 use crate::point::{Metadata, PointBatch, Schema, names};
