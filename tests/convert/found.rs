@@ -93,7 +93,8 @@ fn las_stays_as_it_is_by_auto() {
     let convert = ["convert", "a.laz", "--quiet", "--no-provenance", "-o"];
     done(at, &[&convert[..], &["b.laz"], &auto].concat());
     done(at, &[&convert[..], &["c.laz"]].concat());
-    let uneven = ["convert", "a.laz", "-o", "d.laz", "--scale", "auto", "--offset", "0.0000125,0,0"];
+    let uneven =
+        ["convert", "a.laz", "-o", "d.laz", "--scale", "auto", "--offset", "0.0000125,0,0"];
     fails(at, &uneven, 2, &["no whole number of steps from the offset of the input"]);
     assert_eq!(std::fs::read(at.join("b.laz")).unwrap(), std::fs::read(at.join("c.laz")).unwrap());
 }
