@@ -54,7 +54,7 @@ pub fn output(typed: PathBuf) -> PathBuf {
 /// # Errors
 ///
 /// Standard input that is a terminal, or that cannot be read or set down, and
-/// [`ErrorKind::Interrupted`] if it is [not waited for](wait_until) any longer.
+/// [`ErrorKind::Interrupted`] if it is not waited for any longer.
 pub fn opened(path: &Path) -> Result<PathBuf> {
     if !is_input(path) {
         return Ok(path.to_owned());
@@ -124,6 +124,7 @@ const BLOCK: usize = 1 << 18;
 static STOP: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
 /// From now on standard input is not waited for once `stop` is set. The first to say so is heard.
+#[cfg(feature = "cli")]
 pub fn wait_until(stop: Arc<AtomicBool>) {
     STOP.get_or_init(|| stop);
 }

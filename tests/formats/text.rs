@@ -158,7 +158,7 @@ fn texts_are_written_as_asked() {
     assert_eq!(names[..3], ["X", "Y", "Z"]);
     let drop = names[3..].join(",");
     let text = |name: &str, more: &[&str]| {
-        done(at, &[&["convert", "a.las", "-o", name, "--drop", &drop], more].concat());
+        done(at, &[&["convert", "a.las", "-o", name, "--quiet", "--drop", &drop], more].concat());
         fs::read_to_string(at.join(name)).unwrap()
     };
     let xyz = text("a.xyz", &[]);

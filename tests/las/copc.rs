@@ -142,8 +142,8 @@ fn a_coarse_level_is_a_coarse_reduction_where_points_have_ranks() {
     done(at, &root);
     let (all, root) = (mean_rank(&at.join("r.copc.laz")), mean_rank(&at.join("root.laz")));
     assert!(root.1 < all.1 / 2, "{root:?} of {all:?}");
-    // Where a hash decides, points of all ranks come as often.
-    assert!(root.0 < 0.8 * all.0, "{root:?} of {all:?}");
+    // Where a hash decides, points of all ranks come as often. Eight ranks are a distance of √2.
+    assert!(root.0 < all.0 - 16.0, "{root:?} of {all:?}");
     // From a file that has ranks, the same nodes.
     for to in ["b.copc.laz", "c.copc.laz"] {
         let from = if to == "b.copc.laz" { "r.copc.laz" } else { "b.copc.laz" };
