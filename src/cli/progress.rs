@@ -206,7 +206,8 @@ mod tests {
         files.iter_mut().for_each(|file| file.begin("convert", Some(10)));
         files[1].advance(7);
         assert_eq!(files[1].bar.as_ref().unwrap().position(), 7);
-        bars.beside(|| files[1].advance(8));
+        bars.beside(|| ());
+        files[1].advance(8);
         files[1].begin("write", None);
         let position = |file: &FileBar| file.bar.as_ref().unwrap().position();
         assert_eq!(files.each_ref().map(position), [0, 0]);
