@@ -40,8 +40,8 @@ pub use rounds::{
 };
 pub use scan::{AnyScanOp, Gathered, ScanOp, StoredSummaries, Summary};
 pub use sink::{
-    ChunkSize, CreateSink, Encode, EncodeTriangles, Encoded, Extent, Order, Sink, SinkSummary,
-    Triangle, Triangulation,
+    ChunkSize, CreateSink, Encode, EncodeTriangles, Encoded, Extent, Order, PointsAhead, Sink,
+    SinkSummary, Triangle, Triangulation,
 };
 pub(crate) use source::BATCH;
 pub use source::{Contradiction, Input, OpenSource, Part, Source};

@@ -13,7 +13,7 @@ use asked::SCALE;
 pub(super) use asked::TYPES;
 use columns::{BLOCK, ColumnStep, RecordBytes, TargetBytes};
 use step::{Move, is_single, push, rounding, slack, step};
-pub(super) use told::{check_drop, quoted};
+pub(super) use told::{check_drop, meant_names, quoted};
 use told::{kept_otherwise, placed, room};
 
 use crate::point::names::{BLUE, GREEN, NIR, RED, XYZ};

@@ -65,7 +65,7 @@ impl Losses {
 
     /// What a part that begins to be read counts its losses in.
     pub fn part(&self) -> PartLosses {
-        PartLosses { on_error: self.on_error, ..PartLosses::default() }
+        PartLosses::new(self.on_error)
     }
 
     /// Takes down what was lost of a part so far.
@@ -104,9 +104,14 @@ impl Losses {
 }
 
 impl PartLosses {
-    /// The same, of which nothing is lost yet.
-    pub fn again(&self) -> PartLosses {
-        PartLosses { on_error: self.on_error, ..PartLosses::default() }
+    /// Nothing yet.
+    pub fn new(on_error: OnError) -> Self {
+        PartLosses { on_error, ..PartLosses::default() }
+    }
+
+    /// What is done about damage.
+    pub fn on_error(&self) -> OnError {
+        self.on_error
     }
 
     /// What is told of it.

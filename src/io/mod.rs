@@ -17,6 +17,7 @@ pub mod ply;
 mod project;
 pub(crate) mod rows;
 pub(crate) mod sniff;
+mod steps;
 mod systems;
 pub mod text;
 mod united;

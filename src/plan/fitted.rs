@@ -33,7 +33,7 @@ use crate::host::Threads;
 use crate::point::{Schema, Units};
 use crate::quantity::Figure;
 use crate::report::AcceptTable;
-use crate::stage::{CreateSink, PointWalk, Source};
+use crate::stage::{CreateSink, PointWalk, PointsAhead, Source};
 use crate::store::CLASSED_INPUTS;
 use crate::{Error, Result};
 
@@ -219,16 +219,15 @@ fn fit_stages(
 
 /// Has sinks find in the points what they are asked to find there.
 fn settle(sorted: &mut Sorted, source: &dyn Source, settings: &RunSettings) -> Result<()> {
-    let usual = PointWalk::default();
-    let walk = PointWalk {
-        threads: settings.threads.map_or(usual.threads, NonZeroUsize::get),
-        memory: settings.memory.unwrap_or(usual.memory),
-        ..usual
-    };
     let mut streaming = sorted.transforms.iter().chain(&sorted.filters);
-    let mover = streaming.find(|stage| stage.moves()).map(|stage| stage.kind.as_str());
+    let mover = streaming.find(|stage| stage.moves());
+    let ahead = PointsAhead {
+        source,
+        walk: PointWalk::with(settings.threads.map(NonZeroUsize::get), settings.memory),
+        moved_by: mover.map(|stage| stage.kind.as_str()),
+    };
     for sink in &mut sorted.sinks {
-        if let Some(settled) = sink.settled(source, &walk, mover)? {
+        if let Some(settled) = sink.settled(&ahead)? {
             *sink = settled;
         }
     }

@@ -14,8 +14,8 @@ use crate::io::ends::CountedSink;
 use crate::memory::Records;
 use crate::point::{Metadata, Schema, Units};
 use crate::stage::{
-    ChunkSize, CreateSink, Encode, EncodeTriangles, Encoded, Extent, Order, PointWalk, Role, Sink,
-    SinkSummary, Source, Triangulation,
+    ChunkSize, CreateSink, Encode, EncodeTriangles, Encoded, Extent, Order, PointsAhead, Role,
+    Sink, SinkSummary, Source, Triangulation,
 };
 
 /// What each sink was given, by its number among the sinks.
@@ -116,14 +116,9 @@ impl CreateSink for RehearsedSink {
         false
     }
 
-    fn settled(
-        &self,
-        source: &dyn Source,
-        walk: &PointWalk,
-        moved_by: Option<&str>,
-    ) -> Result<Option<Box<dyn CreateSink>>> {
-        let Some(sink) = self.sink.settled(source, walk, moved_by)? else { return Ok(None) };
-        let of_one = self.of_one.as_ref().map(|one| one.settled(source, walk, moved_by));
+    fn settled(&self, ahead: &PointsAhead<'_>) -> Result<Option<Box<dyn CreateSink>>> {
+        let Some(sink) = self.sink.settled(ahead)? else { return Ok(None) };
+        let of_one = self.of_one.as_ref().map(|one| one.settled(ahead));
         let of_one = of_one.transpose()?.flatten();
         let (scratch, written) = (self.scratch.clone(), self.written.clone());
         Ok(Some(Box::new(RehearsedSink { sink, of_one, number: self.number, scratch, written })))

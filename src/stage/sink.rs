@@ -263,19 +263,13 @@ pub trait CreateSink: Send + Sync {
         Ok(None)
     }
 
-    /// The same sink, where some of what it was asked for depends on the points of `source`: with
-    /// what it found there. Called once, before anything else that is told of the records. Of a
-    /// stage that moves the points on their way here, `moved_by` is the kind.
+    /// The same sink, where some of what it was asked for depends on the points: with what it found
+    /// of them. Called once, before anything else that is told of the records.
     ///
     /// # Errors
     ///
     /// What cannot be found, and what reading the points fails with.
-    fn settled(
-        &self,
-        _source: &dyn Source,
-        _walk: &PointWalk,
-        _moved_by: Option<&str>,
-    ) -> Result<Option<Box<dyn CreateSink>>> {
+    fn settled(&self, _ahead: &PointsAhead<'_>) -> Result<Option<Box<dyn CreateSink>>> {
         Ok(None)
     }
 
@@ -375,6 +369,16 @@ pub trait CreateSink: Send + Sync {
         metadata: &Metadata,
         whole: bool,
     ) -> Result<Box<dyn Sink>>;
+}
+
+/// The points that will come to a sink, for one that looks at them before the run.
+pub struct PointsAhead<'a> {
+    /// Where they are read.
+    pub source: &'a dyn Source,
+    /// How they may be looked through.
+    pub walk: PointWalk<'a>,
+    /// The kind of a stage that moves them on their way to the sink, if one does.
+    pub moved_by: Option<&'a str>,
 }
 
 /// Order of an output's records.

@@ -48,6 +48,16 @@ impl fmt::Debug for PointWalk<'_> {
 }
 
 impl PointWalk<'_> {
+    /// With what is given, and the defaults for the rest.
+    pub(crate) fn with(threads: Option<usize>, memory: Option<u64>) -> Self {
+        let usual = PointWalk::default();
+        PointWalk {
+            threads: threads.unwrap_or(usual.threads),
+            memory: memory.unwrap_or(usual.memory),
+            ..usual
+        }
+    }
+
     /// As many threads as have room, each of which holds `own` bytes besides what it reads.
     fn room(&self, source: &dyn Source, own: u64) -> Result<usize> {
         let batch = Bytes::of(BATCH as u64, source.schema().stride);

@@ -51,11 +51,6 @@ pub(crate) struct WalkArguments {
 impl WalkArguments {
     /// What was given, the defaults for the rest.
     pub fn walk(&self) -> PointWalk<'static> {
-        let usual = PointWalk::default();
-        PointWalk {
-            threads: self.threads.unwrap_or(usual.threads),
-            memory: self.memory.unwrap_or(usual.memory),
-            ..usual
-        }
+        PointWalk::with(self.threads, self.memory)
     }
 }

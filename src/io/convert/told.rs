@@ -1,5 +1,6 @@
 //! The words for values that do not fit, and for dimensions that would get lost.
 
+use crate::error::nearest;
 use crate::point::names::{BLUE, GREEN, INTENSITY, NIR, RED, XYZ};
 use crate::point::{Dimension, Scalar, Schema};
 use crate::report::Short;
@@ -80,6 +81,13 @@ pub(in crate::io) fn quoted(names: &[impl std::fmt::Display]) -> String {
     names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }
 
+/// What helps where `name` is none of those of `schema`, which "it has", or "there are".
+pub(in crate::io) fn meant_names(name: &str, has: &str, schema: &Schema) -> String {
+    let all: Vec<String> = schema.dimensions.iter().map(|d| d.name.clone()).collect();
+    let near = nearest(name, &all).map(|near| format!("did you mean `{near}`? "));
+    format!("{}{has} {}", near.unwrap_or_default(), quoted(&all))
+}
+
 /// Refuses names that cannot be left out of records of `from`.
 pub(in crate::io) fn check_drop(from: &Schema, drop: &[String]) -> Result<()> {
     for name in drop {
@@ -87,12 +95,8 @@ pub(in crate::io) fn check_drop(from: &Schema, drop: &[String]) -> Result<()> {
             return Err(Error::pipeline(format!("`write.drop` names `{name}`: coordinates stay")));
         }
         if from.find(name).is_none() {
-            let all: Vec<String> = from.dimensions.iter().map(|d| d.name.clone()).collect();
             let told = format!("`write.drop` names `{name}`, which the input does not have");
-            let near =
-                crate::error::nearest(name, &all).map(|near| format!("did you mean `{near}`? "));
-            let help = format!("{}it has {}", near.unwrap_or_default(), quoted(&all));
-            return Err(Error::pipeline(told).help(help));
+            return Err(Error::pipeline(told).help(meant_names(name, "it has", from)));
         }
     }
     Ok(())

@@ -13,7 +13,7 @@ use crate::io::sniff;
 use crate::point::names::GPS_TIME;
 use crate::point::{Metadata, PointBatch, Schema};
 use crate::stage::{
-    ChunkSize, CreateSink, Format, Formats, OpenSource, Order, PointWalk, ReadKeys, Sink, Source,
+    ChunkSize, CreateSink, Format, Formats, OpenSource, Order, PointsAhead, ReadKeys, Sink, Source,
     WriteKeys,
 };
 use crate::{Error, Result};
@@ -87,13 +87,8 @@ impl CreateSink for OutputFile {
         format.map(|format| OsStr::new(format.extension())).or(self.keys.path.extension())
     }
 
-    fn settled(
-        &self,
-        source: &dyn Source,
-        walk: &PointWalk,
-        moved_by: Option<&str>,
-    ) -> Result<Option<Box<dyn CreateSink>>> {
-        let keys = self.settled_keys(source, walk, moved_by)?;
+    fn settled(&self, ahead: &PointsAhead<'_>) -> Result<Option<Box<dyn CreateSink>>> {
+        let keys = settled(&self.keys, ahead)?;
         Ok(keys.map(|keys| Box::new(OutputFile { keys, ..self.clone() }) as Box<dyn CreateSink>))
     }
 
@@ -195,16 +190,6 @@ pub(super) fn of_output(error: Error, staged: &Path, path: &Path) -> Error {
 }
 
 impl OutputFile {
-    /// Its keys with what they ask to be found of `source`, if that is anything.
-    pub(super) fn settled_keys(
-        &self,
-        source: &dyn Source,
-        walk: &PointWalk,
-        moved_by: Option<&str>,
-    ) -> Result<Option<WriteKeys>> {
-        settled(&self.keys, source, walk, moved_by).map_err(|error| error.at(&self.keys.path))
-    }
-
     /// A format of the files that records of `schema` come from.
     fn from(&self, schema: &Schema) -> Option<&Arc<dyn Format>> {
         self.formats.of_family(schema.layout.family).next()

@@ -12,7 +12,7 @@ use crate::error::shown;
 use crate::host::standard;
 use crate::point::{Metadata, PointBatch, Schema};
 use crate::stage::{
-    ChunkSize, CreateSink, Format, Formats, Input, Order, PointWalk, ReadKeys, Sink, Source,
+    ChunkSize, CreateSink, Format, Formats, Input, Order, PointsAhead, ReadKeys, Sink, Source,
     WriteKeys,
 };
 use crate::{Error, ErrorKind, Result};
@@ -132,14 +132,8 @@ impl CreateSink for Outputs {
         Ok(Some(all))
     }
 
-    fn settled(
-        &self,
-        source: &dyn Source,
-        walk: &PointWalk,
-        moved_by: Option<&str>,
-    ) -> Result<Option<Box<dyn CreateSink>>> {
-        let keys = settled(&self.keys, source, walk, moved_by);
-        let Some(keys) = keys.map_err(|error| error.at(&self.keys.path))? else { return Ok(None) };
+    fn settled(&self, ahead: &PointsAhead<'_>) -> Result<Option<Box<dyn CreateSink>>> {
+        let Some(keys) = settled(&self.keys, ahead)? else { return Ok(None) };
         let (order, format, formats) = (self.order, self.format.clone(), self.formats.clone());
         Ok(Some(Box::new(Outputs { keys, order, format, formats })))
     }

@@ -4,11 +4,10 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use crate::error::nearest;
-use crate::io::convert::check_drop;
+use crate::io::convert::{check_drop, meant_names};
 use crate::io::rows::names::{meant, shared};
 use crate::point::names::XYZ;
-use crate::point::{Dimension, PointBatch, Schema};
+use crate::point::{PointBatch, Schema};
 use crate::stage::{Renamed, WriteKeys};
 use crate::{Error, Result};
 
@@ -79,7 +78,8 @@ fn check_one(one: &Renamed, keys: &WriteKeys, schema: &Schema) -> Result<()> {
         return Err(refuse(": coordinates keep their names".to_owned()));
     }
     if schema.find(from).is_none() {
-        return Err(missing(refuse(format!(", and the input has no `{from}`")), from, schema));
+        let told = refuse(format!(", and the input has no `{from}`"));
+        return Err(told.help(meant_names(from, "there are", schema)));
     }
     if drop.contains(from) {
         return Err(refuse(format!(", and `write.drop` leaves `{from}` out")));
@@ -107,7 +107,8 @@ fn check_types(keys: &WriteKeys, named: &Schema) -> Result<()> {
         let name = &retyped.name;
         let refuse = |told: String| Error::pipeline(format!("`write.types` has `{retyped}`{told}"));
         if named.find(name).is_none() {
-            return Err(missing(refuse(format!(", and there is no `{name}`")), name, named));
+            let told = refuse(format!(", and there is no `{name}`"));
+            return Err(told.help(meant_names(name, "there are", named)));
         }
         if keys.drop.contains(name) {
             return Err(refuse(format!(", and `write.drop` leaves `{name}` out")));
@@ -117,12 +118,4 @@ fn check_types(keys: &WriteKeys, named: &Schema) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// The error with what helps where `name` is not among those of `schema`.
-fn missing(error: Error, name: &str, schema: &Schema) -> Error {
-    let all: Vec<String> = schema.dimensions.iter().map(|d: &Dimension| d.name.clone()).collect();
-    let near = nearest(name, &all).map_or(String::new(), |near| format!("did you mean `{near}`? "));
-    let quoted: Vec<String> = all.iter().map(|name| format!("`{name}`")).collect();
-    error.help(format!("{near}there are {}", quoted.join(", ")))
 }

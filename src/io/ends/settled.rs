@@ -5,10 +5,11 @@
 //! as `f32` has one, though its digits go on. So the points are read once before the run, and the
 //! most decimals of an axis are its step.
 
+use crate::io::steps::{REACH, reaches, whole_steps};
 use crate::point::names::XYZ;
 use crate::point::{Dimension, Endian, PointBatch, Scalar};
 use crate::quantity::{Figure, Setting};
-use crate::stage::{PointWalk, Source, WriteKeys};
+use crate::stage::{PointWalk, PointsAhead, Source, WriteKeys};
 use crate::{Error, Result};
 
 /// Decimals that are looked for.
@@ -16,41 +17,40 @@ const MOST_DECIMALS: u8 = 12;
 /// How far a coordinate may be from its decimals, in parts of it: steps times a scale, as other
 /// programs sum them up, are some bits off.
 const SLACK: f64 = 4.0 * f64::EPSILON;
-/// Stored coordinates are i32.
-const REACH: f64 = i32::MAX as f64;
 /// The step of a scan without points.
 const STEP_OF_NONE: f64 = 1e-3;
 
-/// `keys` with a scale and an offset in the place of `"auto"`, for points of `source`; None where
-/// nothing is to be found.
+/// `keys` with a scale and an offset in the place of `"auto"`; None where nothing is to be found.
 ///
 /// # Errors
 ///
 /// Points that no scale holds without rounding, points that stages move, and what reading them
 /// fails with.
-pub(super) fn settled(
-    keys: &WriteKeys,
-    source: &dyn Source,
-    walk: &PointWalk,
-    moved_by: Option<&str>,
-) -> Result<Option<WriteKeys>> {
+pub(super) fn settled(keys: &WriteKeys, ahead: &PointsAhead<'_>) -> Result<Option<WriteKeys>> {
     let is_auto = |key: Option<Setting<[f64; 3]>>| key.is_some_and(Setting::is_auto);
-    let (scale_is_auto, offset_is_auto) = (is_auto(keys.scale), is_auto(keys.offset));
-    if !scale_is_auto && !offset_is_auto {
-        return Ok(None);
+    match is_auto(keys.scale) || is_auto(keys.offset) {
+        true => found(keys, ahead).map(Some).map_err(|error| error.at(&keys.path)),
+        false => Ok(None),
     }
-    let mut keys = keys.clone();
-    let key = if scale_is_auto { "write.scale" } else { "write.offset" };
-    if source.schema().layout.steps && keys.scale.is_none_or(Setting::is_auto) {
+}
+
+/// The same where something is to be found.
+fn found(keys: &WriteKeys, ahead: &PointsAhead<'_>) -> Result<WriteKeys> {
+    let (mut keys, source) = (keys.clone(), ahead.source);
+    let key = match keys.scale {
+        Some(Setting::Auto) => "write.scale",
+        _ => "write.offset",
+    };
+    let (scale, offset) = (keys.given_scale(), keys.given_offset());
+    if source.schema().layout.steps && scale.is_none() {
         // The records have steps, which stay as they are.
-        if let Some(offset) = keys.offset.and_then(Setting::given) {
+        if let Some(offset) = offset {
             check_steps(source, offset)?;
         }
-        keys.scale = None;
-        keys.offset = keys.offset.filter(|offset| !offset.is_auto());
-        return Ok(Some(keys));
+        (keys.scale, keys.offset) = (None, offset.map(Setting::Given));
+        return Ok(keys);
     }
-    if let Some(stage) = moved_by {
+    if let Some(stage) = ahead.moved_by {
         let told = format!(
             "`{key} = \"auto\"` looks at points where they are read, and `{stage}` moves them"
         );
@@ -60,27 +60,18 @@ pub(super) fn settled(
         let told = format!("`{key} = \"auto\"` reads the points twice, and these come once");
         return Err(Error::pipeline(told).help("give a scale and an offset"));
     }
-    let spread = Spread::of(source, walk)?;
-    let offset = keys.offset.and_then(Setting::given);
-    let scale = match keys.scale.and_then(Setting::given) {
-        Some(scale) => scale,
-        None => spread.scale(offset)?,
-    };
-    if offset.is_none() {
-        keys.offset = Some(Setting::Given(spread.offset(scale)?));
-    }
-    keys.scale = Some(Setting::Given(scale));
-    Ok(Some(keys))
+    let spread = Spread::of(source, &ahead.walk)?;
+    let scale = scale.map_or_else(|| spread.scale(offset), Ok)?;
+    let offset = offset.map_or_else(|| spread.offset(scale), Ok)?;
+    (keys.scale, keys.offset) = (Some(Setting::Given(scale)), Some(Setting::Given(offset)));
+    Ok(keys)
 }
 
 /// Refuses an offset from which the steps of the records do not come out even.
 fn check_steps(source: &dyn Source, offset: [f64; 3]) -> Result<()> {
     let Some(axes) = source.schema().coordinates() else { return Ok(()) };
-    let is_even = |(axis, offset): (&&Dimension, f64)| {
-        let steps = (offset - axis.origin) / axis.scale;
-        let rounding = 4.0 * f64::EPSILON * offset.abs().max(axis.origin.abs()) / axis.scale.abs();
-        (steps - steps.round()).abs() <= 1e-6 + rounding
-    };
+    let is_even =
+        |(axis, offset): (&&Dimension, f64)| whole_steps(axis.origin, offset, axis.scale).is_some();
     match axes.iter().zip(offset).all(is_even) {
         true => Ok(()),
         false => Err(Error::pipeline(
@@ -245,7 +236,7 @@ impl AxisSpread {
     }
 
     fn reaches(&self, offset: f64, step: f64) -> bool {
-        self.lo > self.hi || (self.lo - offset).abs().max((self.hi - offset).abs()) / step < REACH
+        self.lo > self.hi || reaches([self.lo, self.hi], offset, step)
     }
 
     /// An offset from which all points are within reach: 0 or that of the records if it is one.

@@ -5,11 +5,12 @@ use std::sync::Arc;
 
 use super::connect::OutputFile;
 use super::outputs::check_folder;
+use super::settled::settled;
 use crate::error::{nearest, shown};
 use crate::point::{Metadata, PointBatch, Schema, Units};
 use crate::quantity::Length;
 use crate::stage::{
-    ChunkSize, CreateSink, Order, OutputSplit, PointWalk, Sink, Source, SplitKey, WriteKeys,
+    ChunkSize, CreateSink, Order, OutputSplit, PointsAhead, Sink, Source, SplitKey, WriteKeys,
 };
 use crate::{Error, Result};
 
@@ -220,13 +221,8 @@ impl CreateSink for SplitFiles {
         matches(&self.name(), &name, self.by.places()) && same()
     }
 
-    fn settled(
-        &self,
-        source: &dyn Source,
-        walk: &PointWalk,
-        moved_by: Option<&str>,
-    ) -> Result<Option<Box<dyn CreateSink>>> {
-        let Some(keys) = self.file.settled_keys(source, walk, moved_by)? else { return Ok(None) };
+    fn settled(&self, ahead: &PointsAhead<'_>) -> Result<Option<Box<dyn CreateSink>>> {
+        let Some(keys) = settled(&self.file.keys, ahead)? else { return Ok(None) };
         let file = OutputFile { keys, ..self.file.clone() };
         Ok(Some(Box::new(SplitFiles { file, by: self.by.clone() })))
     }

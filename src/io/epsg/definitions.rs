@@ -1,6 +1,9 @@
 //! Coordinate reference systems by their EPSG codes: what they are, and the well-known text (WKT 1:
 //! OGC 01-009, as GDAL writes it) that says so.
 
+use std::collections::HashMap;
+use std::sync::LazyLock;
+
 use memchr::memmem;
 
 /// What its head says. Lines of a kind stand together.
@@ -38,12 +41,12 @@ pub fn parts(code: u32) -> Option<(u32, u32)> {
 
 /// The geodetic datums that are called `plain`, which is a name as [`plain`] leaves it.
 pub fn datums(plain: &str) -> Vec<u32> {
-    named("datum", plain)
+    DATUMS.get(plain).cloned().unwrap_or_default()
 }
 
 /// The datums of heights of that name.
 pub fn heights(plain: &str) -> Vec<u32> {
-    named("height", plain)
+    HEIGHTS.get(plain).cloned().unwrap_or_default()
 }
 
 /// The geodetic datum of the geographic or projected system `code`.
@@ -62,16 +65,30 @@ pub fn plain(name: &str) -> String {
     name.chars().filter(is_kept).map(|c| c.to_ascii_lowercase()).collect()
 }
 
-fn named(kind: &str, wanted: &str) -> Vec<u32> {
+/// The codes of the datums of a kind by all of their plain names: each of thousands of inputs may
+/// ask for one.
+type CodesByName = HashMap<String, Vec<u32>>;
+
+static DATUMS: LazyLock<CodesByName> = LazyLock::new(|| codes_by_name("datum"));
+static HEIGHTS: LazyLock<CodesByName> = LazyLock::new(|| codes_by_name("height"));
+
+fn codes_by_name(kind: &str) -> CodesByName {
+    let mut codes = CodesByName::new();
     let lines = TABLE.lines().filter_map(|line| line.strip_prefix(kind)?.strip_prefix(' '));
-    let found = lines.filter_map(|line| {
+    for line in lines {
         let mut all = line.split(BAR);
-        let (code, name) = (all.next()?, all.next()?);
+        let (Some(Ok(code)), Some(name)) = (all.next().map(str::parse), all.next()) else {
+            continue;
+        };
         // Behind the name is its ellipsoid, then other names.
-        let is_it = plain(name) == wanted || all.skip(1).any(|other| plain(other) == wanted);
-        code.parse().ok().filter(|_| is_it)
-    });
-    found.collect()
+        for name in [name].into_iter().chain(all.skip(1)) {
+            let of_name = codes.entry(plain(name)).or_default();
+            if of_name.last() != Some(&code) {
+                of_name.push(code);
+            }
+        }
+    }
+    codes
 }
 
 /// The fields behind the code of a line.

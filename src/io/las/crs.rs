@@ -95,10 +95,7 @@ fn first_text(vlrs: &[Vlr], evlrs: &[Evlr], user: &str, record: u16) -> Result<O
 mod tests {
     use super::*;
     use crate::io::las::geokeys;
-
-    fn keys(words: &[u16]) -> Vlr {
-        Vlr::new(USER, GEO_KEYS, "", words.iter().flat_map(|w| w.to_le_bytes()).collect())
-    }
+    use crate::io::las::geokeys::tests::keys;
 
     #[test]
     fn epsg_codes_become_keys_and_come_back() {

@@ -8,17 +8,11 @@
 use std::path::PathBuf;
 
 use super::header::Header;
+use crate::io::steps::{reaches, whole_steps};
 use crate::{Error, Result};
-
-/// Offsets whose distance is this close to whole steps differ by whole steps: decimal offsets are
-/// seldom exact in binary.
-const WHOLE: f64 = 1e-6;
 
 /// Digits behind the point that are told apart.
 const MOST_DECIMALS: i32 = 15;
-
-/// Stored coordinates are i32.
-const REACH: f64 = i32::MAX as f64;
 
 /// The largest steps per axis that those of all headers are whole numbers of, their offsets being
 /// whole steps apart.
@@ -50,7 +44,7 @@ pub fn offset(headers: &[Header], scale: [f64; 3]) -> Option<[f64; 3]> {
         let whole = bounds.reduce(|[lo, hi], [a, b]| [lo.min(a), hi.max(b)]);
         let Some([lo, hi]) = whole else { continue };
         let step = scale[axis];
-        let reaches = |from: f64| (lo - from).abs().max((hi - from).abs()) / step < REACH;
+        let reaches = |from: f64| reaches([lo, hi], from, step);
         if !reaches(*offset) {
             *offset += ((f64::midpoint(lo, hi) - *offset) / step).round() * step;
         }
@@ -85,19 +79,6 @@ pub fn holding(one: u8, two: u8) -> Option<u8> {
 pub fn smallest<'a>(headers: impl Iterator<Item = &'a Header>) -> [f64; 3] {
     let least = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|axis| a[axis].min(b[axis]));
     headers.map(Header::offset).reduce(least).unwrap_or_default()
-}
-
-/// The steps of `scale` from one offset to another, if they are whole and stored coordinates, which
-/// are i32, can move by them.
-pub fn whole_steps(from: f64, to: f64, scale: f64) -> Option<i64> {
-    if from == to {
-        return Some(0);
-    }
-    let steps = (to - from) / scale;
-    let whole = steps.round();
-    let rounding = 4.0 * f64::EPSILON * (from.abs().max(to.abs()) / scale).abs();
-    let near = (steps - whole).abs() <= WHOLE + rounding && whole.abs() < 2f64.powi(32);
-    near.then_some(whole as i64)
 }
 
 fn too_fine(paths: &[PathBuf]) -> Error {

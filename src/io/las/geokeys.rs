@@ -174,14 +174,16 @@ pub fn text(vlrs: &[Vlr]) -> Option<String> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn of(vlrs: &[Vlr]) -> Units {
+    /// The units that the keys among these say.
+    pub fn of(vlrs: &[Vlr]) -> Units {
         GeoKeys::of(vlrs).map(|keys| keys.units(vlrs)).unwrap_or_default()
     }
 
-    fn keys(words: &[u16]) -> Vlr {
+    /// A directory of these words.
+    pub fn keys(words: &[u16]) -> Vlr {
         Vlr::new(USER, GEO_KEYS, "", words.iter().flat_map(|w| w.to_le_bytes()).collect())
     }
 

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::found::whole_steps;
 use super::native::Native;
 use super::read::Shift;
+use crate::io::steps::whole_steps;
 use crate::point::{Metadata, PointBatch, Schema, names};
 use crate::stage::{ChunkSize, Encode, Encoded, Extent, Sink, SinkSummary};
 use crate::{Error, Result};

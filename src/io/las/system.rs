@@ -77,12 +77,9 @@ impl CrsRecords {
 
 #[cfg(test)]
 mod tests {
-    use super::super::crs::{GEO_ASCII, GEO_DOUBLES, GEO_KEYS, USER, WKT};
+    use super::super::crs::{GEO_ASCII, GEO_DOUBLES, USER, WKT};
+    use super::super::geokeys::tests::keys;
     use super::*;
-
-    fn keys(words: &[u16]) -> Vlr {
-        Vlr::new(USER, GEO_KEYS, "", words.iter().flat_map(|w| w.to_le_bytes()).collect())
-    }
 
     #[test]
     fn one_system_in_other_words_is_one() {

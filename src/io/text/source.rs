@@ -10,7 +10,7 @@ use super::names::{LONGEST_LINE, RECORDS};
 use super::ptx::{self, PtxScan, PtxText};
 use super::survey::{CORRECT, TextStretch, TextSurvey, belied, few, no_number, survey};
 use crate::error::shown;
-use crate::io::damage::{Losses, PartLosses};
+use crate::io::damage::PartLosses;
 use crate::io::origin::Origin;
 use crate::io::rows::facts::ColumnFacts;
 use crate::io::rows::fields::{Delimiter, Fields, is_comment, is_count};
@@ -100,7 +100,7 @@ impl TextFile {
         let all = keys.on_error != OnError::Fail;
         let is_read = |n: usize| named.as_ref().is_none_or(|named| named[n].is_some());
         let looks = (0..head.columns).map(|n| looks(n) || all && is_read(n)).collect();
-        let lost = Losses::new(keys.on_error).part();
+        let lost = PartLosses::new(keys.on_error);
         let mut found = survey(origin.reopen()?, path, length, &head, looks, lost)?;
         let mut warnings = Vec::new();
         let columns = match named {
@@ -262,7 +262,7 @@ impl Source for TextSource {
             cell: stretch.cells,
         });
         let (left, source) = (stretch.points, number as u32);
-        let (schema, lost) = (&*self.schema, file.found.lost.again());
+        let (schema, lost) = (&*self.schema, PartLosses::new(file.found.lost.on_error()));
         Ok(Box::new(TextPart { file, lines, fields, schema, grid, left, source, lost }))
     }
 

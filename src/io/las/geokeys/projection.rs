@@ -156,17 +156,9 @@ fn utm(code: u16) -> Option<(&'static str, Vec<(&'static str, f64)>)> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::{keys, of};
     use super::super::{GEO_ASCII, GEO_DOUBLES, GEO_KEYS, USER, text as named};
     use super::*;
-    use crate::point::Units;
-
-    fn of(vlrs: &[Vlr]) -> Units {
-        GeoKeys::of(vlrs).map(|keys| keys.units(vlrs)).unwrap_or_default()
-    }
-
-    fn keys(words: &[u16]) -> Vlr {
-        Vlr::new(USER, GEO_KEYS, "", words.iter().flat_map(|w| w.to_le_bytes()).collect())
-    }
 
     /// Keys, of which those above 3076 but for units have their numbers among the doubles.
     fn described(words: &[u16], numbers: &[(u16, f64)]) -> [Vlr; 2] {
