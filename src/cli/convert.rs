@@ -169,10 +169,9 @@ fn pipeline(
     output: Value,
     registry: &Registry,
 ) -> Result<Graph> {
-    let from = arguments.read.from.as_deref();
     let sets = given([
         convert_flags(arguments, Some(inputs.clone()), Some(output)),
-        one_form(&paths(&inputs), from, &arguments.written, registry),
+        one_form(&paths(&inputs), &arguments.read, &arguments.written, registry),
         common_flags(&arguments.common),
     ]);
     let filter = arguments.filter.is_given().then_some("filter");

@@ -270,6 +270,7 @@ fn read(arguments: &ReadArguments) -> Vec<CommandFlag> {
         ("--columns", "read.columns", columns),
         ("--scans", "read.scans", scans),
         ("--crs", "read.crs", arguments.crs.clone().map(FlagValue::from)),
+        ("--reproject", "read.reproject", arguments.reproject.clone().map(FlagValue::from)),
         ("--box", "read.box", arguments.bounds.as_deref().map(numbers_or_text)),
         ("--resolution", "read.resolution", arguments.resolution.as_deref().map(number_or_text)),
         ("--on-error", "read.on_error", arguments.on_error.clone().map(FlagValue::from)),
@@ -277,10 +278,11 @@ fn read(arguments: &ReadArguments) -> Vec<CommandFlag> {
     ])
 }
 
-/// [`united`] where `inputs` are several LAS files; other inputs are not brought to such a form.
+/// [`united`] where `inputs` are several LAS files, or LAS files whose coordinates become others;
+/// other inputs are not brought to such a form.
 pub(super) fn one_form(
     inputs: &[String],
-    from: Option<&str>,
+    read: &ReadArguments,
     arguments: &WrittenArguments,
     registry: &Registry,
 ) -> Vec<CommandFlag> {
@@ -289,14 +291,16 @@ pub(super) fn one_form(
         return form;
     }
     let formats = registry.formats();
-    let named = from.and_then(|name| formats.iter().find(|format| format.name() == name));
+    let named =
+        read.from.as_deref().and_then(|name| formats.iter().find(|format| format.name() == name));
     let has_scale = |file: &PathBuf| {
         let format = named.or_else(|| formats.of(file));
         format.is_some_and(|format| format.read_keys().contains(&"scale"))
     };
     // What is wrong with the names, the run tells.
     let files = expand(inputs, formats).unwrap_or_default();
-    match files.len() > 1 && files.iter().all(has_scale) {
+    let is_wanted = files.len() > 1 || read.reproject.is_some();
+    match is_wanted && files.iter().all(has_scale) {
         true => form,
         false => Vec::new(),
     }

@@ -2,7 +2,7 @@
 
 /// How inputs are read: the fields of `ReadArguments`.
 const READ: &[&str] =
-    &["from", "columns", "scans", "crs", "assume", "on_error", "bounds", "resolution"];
+    &["from", "columns", "scans", "crs", "reproject", "assume", "on_error", "bounds", "resolution"];
 
 /// How outputs are written: the fields of `WrittenArguments`.
 const WRITTEN: &[&str] = &[

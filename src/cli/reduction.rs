@@ -18,8 +18,7 @@ const ITS_NUMBER: &str = "keep = \"10%\"";
 /// The pipeline of `reduce`.
 pub(super) fn reduction(arguments: &ReduceArguments, registry: &Registry) -> Result<Graph> {
     let preset = arguments.preset.map_or(Vec::new(), Preset::sets);
-    let from = arguments.read.from.as_deref();
-    let form = one_form(&arguments.inputs, from, &arguments.written, registry);
+    let form = one_form(&arguments.inputs, &arguments.read, &arguments.written, registry);
     let sets = given([reduce_flags(arguments), form, common_flags(&arguments.common)]);
     let sets = [preset, sets].concat();
     let outliers = arguments.outliers.then_some("outliers");

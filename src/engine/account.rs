@@ -63,6 +63,7 @@ impl Task {
             spill_bytes: job.area.written(),
             warnings,
             lost: self.source.lost(),
+            reprojection: self.source.reprojection(),
             ..RunFigures::default()
         }
     }

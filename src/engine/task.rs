@@ -99,7 +99,7 @@ impl Task {
     /// What an input says, for its own output or for that of all.
     pub fn said(&self, metadata: Metadata) -> Metadata {
         let moved = *self.schemas.last != **self.source.schema();
-        Metadata { moved, ..metadata }
+        Metadata { moved: moved || metadata.moved, ..metadata }
     }
 
     /// What the source says, for a sink whose records go through the stages `pipeline`.

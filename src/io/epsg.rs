@@ -2,9 +2,13 @@
 //! WKT 1 has words for them. The table of units has the kind and the unit of every code.
 
 mod definitions;
+#[cfg(feature = "proj")]
+mod lists;
 
 use crate::point::{Horizontal, Units};
 pub use definitions::{datum_of, datums, heights, parts, plain, unit_text, vertical_text, wkt};
+#[cfg(feature = "proj")]
+pub use lists::{heights_on, systems_on};
 
 /// A line holds a kind of system, metres in a unit of its lengths, and codes: single ones and
 /// ranges.

@@ -4,6 +4,8 @@
 //!
 //! In what order a text names its axes plays no part: x of a scan is east, whatever it says.
 
+#[cfg(feature = "proj")]
+mod codes;
 mod methods;
 
 use std::collections::BTreeMap;

@@ -15,6 +15,8 @@ mod origin;
 pub mod pcd;
 pub mod ply;
 mod project;
+#[cfg(feature = "proj")]
+mod reproject;
 pub(crate) mod rows;
 pub(crate) mod sniff;
 mod steps;

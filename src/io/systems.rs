@@ -15,8 +15,7 @@ use crate::{Error, Result};
 /// Fails, with what would do, if it is neither, or of a code that nothing is known of.
 pub fn checked(text: &str) -> std::result::Result<String, String> {
     let text = text.trim();
-    let is_code = text.get(..5).is_some_and(|begin| begin.eq_ignore_ascii_case("EPSG:"));
-    if !is_code {
+    if !is_code(text) {
         let is_whole = wkt::is_wkt(text) && wkt::alike(text, text);
         return match is_whole {
             true => Ok(text.to_owned()),
@@ -45,6 +44,22 @@ pub fn checked(text: &str) -> std::result::Result<String, String> {
         Some(up) => Err(format!("EPSG:{up} is no system of heights that is known here")),
         None => Ok(up.map_or(format!("EPSG:{across}"), |up| format!("EPSG:{across}+{up}"))),
     }
+}
+
+/// The same of EPSG codes alone.
+pub fn checked_code(text: &str) -> std::result::Result<String, String> {
+    match is_code(text.trim()) {
+        true => checked(text),
+        false => {
+            Err("the coordinate reference system of the output is given by its EPSG code, as \
+                      `EPSG:25832`, or as `EPSG:25832+7837` with that of the heights"
+                .to_owned())
+        }
+    }
+}
+
+fn is_code(text: &str) -> bool {
+    text.get(..5).is_some_and(|begin| begin.eq_ignore_ascii_case("EPSG:"))
 }
 
 /// True if both texts mean one system: the same text, WKT of one wording or the same EPSG codes

@@ -34,7 +34,8 @@ pub struct Metadata {
     pub note: Option<Arc<RunNote>>,
     /// The dimensions that stages computed and the output is to have.
     pub computed: Vec<ComputedDimension>,
-    /// True if stages moved the points, so that offsets of the input are not theirs any more.
+    /// True if the points were moved, so that offsets and the reference system that the records of
+    /// an input's file name are not theirs any more.
     pub moved: bool,
     /// Free text lines, such as the comments of a PLY header.
     pub comments: Vec<String>,

@@ -118,6 +118,28 @@ pub struct RunFigures {
     pub warnings: Vec<String>,
     /// Points of damaged inputs that were not read; not written where there are none.
     pub lost: Vec<LostPoints>,
+    /// How the points came to the coordinate reference system that they are in; not written where
+    /// they are in that of the inputs.
+    pub reprojection: Option<Reprojection>,
+}
+
+/// How points came from one coordinate reference system to another.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct Reprojection {
+    /// The system of the inputs, as EPSG codes.
+    pub from: String,
+    /// That of the points, likewise.
+    pub to: String,
+    /// Name of the operation between the datums of the two; None where they have one datum.
+    pub operation: Option<String>,
+    /// Its EPSG code, where it has one.
+    pub code: Option<u32>,
+    /// How accurate it is said to be, in metres; 0 between systems on one datum; None where nothing
+    /// says.
+    pub accuracy: Option<f64>,
+    /// A better one, which is not known here: how accurate it is, and what it takes.
+    pub better: Option<String>,
 }
 
 /// Points of a damaged input that are lost.
@@ -267,6 +289,9 @@ impl RunFigures {
         object.entry("warnings", &self.warnings)?;
         if !self.lost.is_empty() {
             object.entry("lost", &self.lost)?;
+        }
+        if let Some(reprojection) = &self.reprojection {
+            object.entry("reprojection", reprojection)?;
         }
         object.close()
     }

@@ -29,8 +29,8 @@ pub(crate) use baseline::Baseline;
 pub(crate) use classes::{ClassCounts, class_name};
 pub(crate) use digits::{Coordinate, Grouped, Long, Short};
 pub use document::{
-    Decision, FileFigures, LatticeFigures, LostPoints, Outcome, Phase, Report, RunFigures,
-    result_bytes,
+    Decision, FileFigures, LatticeFigures, LostPoints, Outcome, Phase, Report, Reprojection,
+    RunFigures, result_bytes,
 };
 pub use figures::{
     BaselineFigures, ClassFigures, DeviationBin, DeviationFigures, DeviationTotals, Pair,

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::point::{Metadata, PointBatch, Schema};
-use crate::report::LostPoints;
+use crate::report::{LostPoints, Reprojection};
 use crate::{Error, Result};
 
 /// Opens the inputs of a source: headers only, no point.
@@ -147,6 +147,11 @@ pub trait Source: Send + Sync {
     /// read to its end.
     fn lost(&self) -> Vec<LostPoints> {
         Vec::new()
+    }
+
+    /// How its points came to the system that they are in, where inputs are in another.
+    fn reprojection(&self) -> Option<Reprojection> {
+        None
     }
 
     /// What headers say of points and is not so. Asked when every part was read to its end; of

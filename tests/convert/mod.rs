@@ -9,6 +9,7 @@ mod fields;
 mod found;
 mod inputs;
 mod point_formats;
+mod reproject;
 mod reshaped;
 mod runs;
 mod units;

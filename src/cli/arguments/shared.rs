@@ -91,9 +91,13 @@ pub(crate) struct ReadArguments {
     #[arg(long, value_name = "FORMAT")]
     pub from: Option<String>,
     /// Coordinate reference system that all inputs are in, whatever they say: EPSG:25832, with a
-    /// vertical one EPSG:25832+7837, or WKT; nothing is reprojected [default: as they say]
+    /// vertical one EPSG:25832+7837, or WKT; points stay where they are [default: as they say]
     #[arg(long, value_name = "CRS")]
     pub crs: Option<String>,
+    /// Coordinate reference system that points are brought to, by its EPSG code, such as
+    /// EPSG:25832; heights stay as they are, or change their unit: EPSG:25832+7837 [default: theirs]
+    #[arg(long, value_name = "EPSG")]
+    pub reproject: Option<String>,
     /// Where points of LAS, LAZ and COPC are read, in their coordinates; of COPC only that is read:
     /// X0,Y0,X1,Y1 or X0,Y0,Z0,X1,Y1,Z1 [default: everywhere]
     #[arg(long = "box", value_name = "CORNERS", allow_hyphen_values = true)]

@@ -9,9 +9,13 @@ use std::sync::Arc;
 use super::reshaped::Reshaped;
 use super::settled::settled;
 use crate::error::shown;
+#[cfg(feature = "proj")]
+use crate::io::reproject::{self, AskedSteps};
 use crate::io::sniff;
 use crate::point::names::GPS_TIME;
 use crate::point::{Metadata, PointBatch, Schema};
+#[cfg(feature = "proj")]
+use crate::quantity::Setting;
 use crate::stage::{
     ChunkSize, CreateSink, Format, Formats, OpenSource, Order, PointsAhead, ReadKeys, Sink, Source,
     WriteKeys,
@@ -28,12 +32,18 @@ pub struct InputFiles {
     pub keys: ReadKeys,
     /// All formats, for what a file is that is none of these.
     pub formats: Formats,
+    /// The system that points are brought to, where that is asked for.
+    pub reproject: Option<String>,
 }
 
 impl OpenSource for InputFiles {
     fn open(&self) -> Result<Box<dyn Source>> {
         let told = |error| sniff::told(error, &*self.format, &self.formats);
-        self.format.open(&self.files, &self.keys).map_err(told)
+        let opened = |keys: &ReadKeys| self.format.open(&self.files, keys).map_err(told);
+        match &self.reproject {
+            None => opened(&self.keys),
+            Some(to) => reprojected(to, &self.keys, opened),
+        }
     }
 
     fn paths(&self) -> Vec<PathBuf> {
@@ -57,9 +67,33 @@ impl OpenSource for InputFiles {
         }
         files.extend(more);
         let (format, formats) = (self.format.clone(), self.formats.clone());
-        let keys = self.keys.clone();
-        Ok(Box::new(InputFiles { files, format, keys, formats }))
+        let (keys, reproject) = (self.keys.clone(), self.reproject.clone());
+        Ok(Box::new(InputFiles { files, format, keys, formats, reproject }))
     }
+}
+
+/// What `open` opens, in the system `to`. Scale and offset are those of the points there: inputs
+/// that differ in them are read as one by the finest.
+#[cfg(feature = "proj")]
+fn reprojected(
+    to: &str,
+    keys: &ReadKeys,
+    open: impl Fn(&ReadKeys) -> Result<Box<dyn Source>>,
+) -> Result<Box<dyn Source>> {
+    let asked = AskedSteps { scale: keys.scale, offset: keys.offset };
+    let auto = |key: Option<Setting<[f64; 3]>>| key.map(|_| Setting::Auto);
+    let (scale, offset) = (auto(keys.scale), auto(keys.offset));
+    reproject::reprojected(open(&ReadKeys { scale, offset, ..keys.clone() })?, to, asked)
+}
+
+#[cfg(not(feature = "proj"))]
+fn reprojected(
+    _to: &str,
+    _keys: &ReadKeys,
+    _open: impl Fn(&ReadKeys) -> Result<Box<dyn Source>>,
+) -> Result<Box<dyn Source>> {
+    let told = "`read.reproject` is not in this pointmill, which was built without it";
+    Err(Error::pipeline(told).help("build it with its feature `proj`, which is there by default"))
 }
 
 /// The sink that writes a file of one format.

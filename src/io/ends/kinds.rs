@@ -6,8 +6,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::values::{
-    names_once, offset_or_auto, one_or_more, one_or_three, some_columns, some_crs, some_positive,
-    some_scale, some_scans, texts, three_or_auto,
+    names_once, offset_or_auto, one_or_more, one_or_three, some_code, some_columns, some_crs,
+    some_positive, some_scale, some_scans, texts, three_or_auto,
 };
 use crate::quantity::{CropBox, Length, Setting, SizeText, Whole, some_bytes};
 use crate::stage::{
@@ -40,6 +40,27 @@ use crate::stage::{
 /// for: a text is looked through for such before it is read. `scalar_Intensity` and other scalar
 /// fields, as CloudCompare writes them, are the dimensions that they are named after. A text that
 /// ends within a line is told, since its last number may be cut short.
+///
+/// # Reprojection
+///
+/// With `reproject` the points are brought to another coordinate reference system as they are read,
+/// and all that a pipeline does happens there; `box` and `resolution` speak of the inputs still.
+/// Systems and the operations between their datums are those of EPSG. Of the operations that are
+/// meant for all of the place where the scan is, the most accurate that needs no file of a grid is
+/// taken. A warning names it with its accuracy, and a better one that needs such a file, where there
+/// is one; `run.reprojection` of a report has them, too. Systems between which there is none without
+/// a file are refused, and none are ever treated as one because they are alike. Between systems on
+/// one datum nothing is lost, and nothing is told.
+///
+/// Heights stay as they are where the system that is asked for names none, and the output still says
+/// whose they are. `"EPSG:25832+7837"` changes their unit, or depths to heights; heights of another
+/// datum would take a grid and are refused. Heights above the ellipsoid (`"EPSG:4979"`, and the
+/// three axes of `"EPSG:4978"`) change with the place.
+///
+/// Steps of coordinates become those of the largest power of ten that is no longer on the ground, or
+/// of `scale` and `offset`, which are those of the new coordinates then; other coordinates become
+/// `f64`. Normals are not turned, which is told. Sines and the like are those of the machine: their
+/// last bit may differ from one kind of machine to another, and in rare cases a step with it.
 ///
 /// # Formats
 ///
@@ -108,6 +129,11 @@ pub struct Read {
     /// is reprojected.
     #[serde(default, deserialize_with = "some_crs")]
     pub crs: Option<String>,
+    /// The coordinate reference system that points are brought to as they are read, by its EPSG
+    /// code, with another for heights where these change their unit, such as `"EPSG:25832"`; none:
+    /// they stay in theirs.
+    #[serde(default, deserialize_with = "some_code", skip_serializing_if = "Option::is_none")]
+    pub reproject: Option<String>,
     /// What is taken for granted: `"crs"`, that inputs which name no coordinate reference system
     /// are in the one that the others name; `"extra-bytes"`, that extra bytes which not all LAS
     /// inputs have hold nothing in the points of the others: the no-data value of their

@@ -36,7 +36,8 @@ impl Read {
         formats: &Formats,
     ) -> Box<dyn OpenSource> {
         let (keys, formats) = (self.keys(), formats.clone());
-        Box::new(connect::InputFiles { files, format, keys, formats })
+        let reproject = self.reproject.clone();
+        Box::new(connect::InputFiles { files, format, keys, formats, reproject })
     }
 
     /// The files, and a format of theirs.

@@ -20,6 +20,12 @@ pub(super) fn some_crs<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Stri
     systems::checked(&given).map(Some).map_err(de::Error::custom)
 }
 
+/// EPSG codes that are known.
+pub(super) fn some_code<'de, D: Deserializer<'de>>(from: D) -> Result<Option<String>, D::Error> {
+    let given = String::deserialize(from)?;
+    systems::checked_code(&given).map(Some).map_err(de::Error::custom)
+}
+
 /// Numbers of scans, at least one.
 pub(super) fn some_scans<'de, D: Deserializer<'de>>(
     from: D,

@@ -7,9 +7,9 @@ use std::sync::LazyLock;
 use memchr::memmem;
 
 /// What its head says. Lines of a kind stand together.
-const TABLE: &str = include_str!("systems.txt");
+pub(super) const TABLE: &str = include_str!("systems.txt");
 /// The calendar of a line's values: what stands between them.
-const BAR: char = '|';
+pub(super) const BAR: char = '|';
 /// The method of Web Mercator, which WKT 1 has no word for, ends with this in the table; and what
 /// GDAL adds in its place.
 const SPHERE: char = '*';

@@ -12,7 +12,7 @@ use super::native::Native;
 use super::text::{field, split_at_room};
 use super::vlr::Vlr;
 use crate::Result;
-use crate::io::wkt;
+use crate::io::{systems, wkt};
 use crate::point::{GpsTime, Metadata, Schema};
 
 /// User and number of the record that names the stages which the records went through.
@@ -27,6 +27,9 @@ pub fn name_system(
     metadata: &Metadata,
     notes: &mut Vec<String>,
 ) -> Result<()> {
+    if metadata.moved {
+        name_other_system(native, metadata)?;
+    }
     if native.header.format() >= 6 {
         name_by_text(native, notes)?;
     }
@@ -37,6 +40,25 @@ pub fn name_system(
     let there = crs::text(&native.vlrs, &native.evlrs)?.is_some();
     if let (Err(why), false) = (crs::record(text), there) {
         notes.push(format!("the CRS is not carried: {why}: {}", shortened(text)));
+    }
+    Ok(())
+}
+
+/// Names the system that moved points are in now, if the records name another.
+fn name_other_system(native: &mut Native, metadata: &Metadata) -> Result<()> {
+    let Some(text) = &metadata.crs else { return Ok(()) };
+    let said = crs::text(&native.vlrs, &native.evlrs)?;
+    if said.is_some_and(|said| systems::are_same(&said, text)) {
+        return Ok(());
+    }
+    let at = native.vlrs.iter().position(|vlr| crs::is_record(&vlr.user(), vlr.record()));
+    let at = at.unwrap_or(native.vlrs.len());
+    native.vlrs.retain(|vlr| !crs::is_record(&vlr.user(), vlr.record()));
+    native.evlrs.retain(|evlr| !crs::is_record(&evlr.user(), evlr.record()));
+    // Where it is named by GeoTIFF keys: point formats 6 to 10 get WKT in their place yet.
+    native.header.put_encoding(encoding::WKT, wkt::is_wkt(text));
+    if let Ok(record) = crs::record(text) {
+        native.vlrs.insert(at.min(native.vlrs.len()), record);
     }
     Ok(())
 }
