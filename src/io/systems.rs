@@ -133,11 +133,10 @@ fn differ(path: &Path, other: &Path, crs: Option<&str>, of_other: Option<&str>) 
 pub fn remedy(is_missing: bool) -> String {
     let all = "`read.crs = \"EPSG:25832\"` says which system all inputs are in, if they are in one";
     match is_missing {
-        true => format!(
-            "if both are in one system, give `read.assume = [\"crs\"]`; {all}; nothing is \
-             reprojected"
+        true => format!("if both are in one system, give `read.assume = [\"crs\"]`; {all}"),
+        false => format!(
+            "{all}; if they are in several, bring each to one by itself: `read.reproject` does it"
         ),
-        false => format!("{all}; nothing is reprojected"),
     }
 }
 

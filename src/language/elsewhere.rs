@@ -56,19 +56,8 @@ pub(super) fn told(kind: &str, keys: &Node) -> Option<(String, String)> {
     let name = lower.rsplit('.').next().unwrap_or(&lower).replace('-', "_");
     let name = name.as_str();
     if REPROJECT.contains(&name) {
-        let told = format!(
-            "there is no stage `{kind}`: pointmill does not change coordinate reference systems, \
-             in which it would have to agree with PROJ to the millimetre"
-        );
         let to = target(keys).unwrap_or_else(|| "EPSG:25832".to_owned());
-        return Some((
-            told,
-            format!(
-                "`pdal translate scan.laz moved.laz reprojection \
-                 --filters.reprojection.out_srs={to}` does, or `cs2cs` for a list of points; then \
-                 read what it wrote"
-            ),
-        ));
+        return Some(is_here(kind, &format!("the key `reproject = \"{to}\"` of `read`")));
     }
     if let Some((_, what, help)) = OTHERS.iter().find(|(names, ..)| names.contains(&name)) {
         let told = format!("there is no stage `{kind}`: pointmill does not {what}");
@@ -178,13 +167,11 @@ mod tests {
     }
 
     #[test]
-    fn who_asks_to_reproject_is_told_the_command_that_does_it() {
+    fn who_asks_to_reproject_is_told_the_key_that_does_it() {
         let text = told("kind = 'filters.reprojection', out_srs = 'EPSG:4326'");
-        let command = "--filters.reprojection.out_srs=EPSG:4326` does";
-        assert!(text.contains("does not change coordinate reference systems"), "{text}");
-        assert!(text.contains(command), "{text}");
-        // What could not stand in a command is not put there.
+        assert!(text.contains("is here the key `reproject = \"EPSG:4326\"` of `read`"), "{text}");
+        // What could not stand in a pipeline is not put there.
         let text = told("kind = 'reproject', to = 'a; rm -r b'");
-        assert!(text.contains("out_srs=EPSG:25832` does"), "{text}");
+        assert!(text.contains("`reproject = \"EPSG:25832\"`"), "{text}");
     }
 }

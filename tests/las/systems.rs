@@ -122,7 +122,7 @@ fn files_of_one_system_in_other_spellings_merge_and_others_do_not() {
     let wkt2 = "12-wkt2-4224-liblas.las";
     merged(&[wkt2, "code.las"]);
     fails(at, &["convert", wkt2, "esri.las", "-o", "o.las"], 1, &["CRS differ", "--crs"]);
-    let told = ["other.las", "--crs", "nothing is reprojected"];
+    let told = ["other.las", "--crs", "`--reproject` does it"];
     fails(at, &["convert", "esri.las", "other.las", "-o", "o.las"], 1, &told);
 }
 

@@ -125,8 +125,8 @@ pub struct Read {
     #[serde(default, deserialize_with = "some_scans")]
     pub scans: Option<Vec<ScanNumber>>,
     /// The coordinate reference system that all inputs are in, whatever they say of it: WKT, or
-    /// `"EPSG:25832"`, or `"EPSG:25832+7837"` with that of the heights; none: as they say. Nothing
-    /// is reprojected.
+    /// `"EPSG:25832"`, or `"EPSG:25832+7837"` with that of the heights; none: as they say. Points
+    /// stay where they are: `reproject` moves them.
     #[serde(default, deserialize_with = "some_crs")]
     pub crs: Option<String>,
     /// The coordinate reference system that points are brought to as they are read, by its EPSG

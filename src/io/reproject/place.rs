@@ -67,13 +67,13 @@ pub fn image(transform: &PointTransform, [lo, hi]: [[f64; 3]; 2]) -> Option<[[f6
             found[1][axis] = found[1][axis].max(image);
         }
     }
-    let keeps = transform.keeps_heights();
-    for axis in 0..if keeps { 2 } else { 3 } {
-        let more = (found[1][axis] - found[0][axis]) * BULGE;
-        found[0][axis] -= more;
-        found[1][axis] += more;
+    let [mut low, mut high] = found;
+    let changed = if transform.keeps_heights() { 2 } else { 3 };
+    for (low, high) in low.iter_mut().zip(&mut high).take(changed) {
+        let more = (*high - *low) * BULGE;
+        (*low, *high) = (*low - more, *high + more);
     }
-    (found[0][0] <= found[1][0]).then_some(found)
+    (low[0] <= high[0]).then_some([low, high])
 }
 
 /// Points of a box of [`ALONG`] steps on each axis: those of its sides, at the top and the bottom.
