@@ -8,8 +8,9 @@ use super::passes::Passes;
 use super::sorted::{Sorted, blame};
 use crate::budget::Bytes;
 use crate::engine::pass::{ColumnBytes, Op, Pass, standings};
-use crate::engine::shares::Demands;
+use crate::engine::shares::{Arranging, Demands};
 use crate::engine::{by_input, by_rank, by_split};
+use crate::geom::lattice::Lattice;
 use crate::graph::{MOST_THREADS, RunSettings};
 use crate::host::process::{default_memory, processors};
 use crate::point::{ComputedDimension, Metadata, Schema};
@@ -48,6 +49,29 @@ pub(super) fn demands(
             .any(|stage| stage.op.tile().needs().cells || matches!(stage.op, Op::Round(_))),
         ..Demands::of(source, &chunks, limit, threads(settings)?)
     })
+}
+
+/// The same with what outputs hold that arrange points on `lattice`.
+pub(super) fn arranged(
+    mut demands: Demands,
+    sorted: &Sorted,
+    (source, schema): (&dyn Source, &Arc<Schema>),
+    lattice: Option<&Lattice>,
+) -> Result<Demands> {
+    let Some(lattice) = lattice else { return Ok(demands) };
+    let threads = demands.threads as u64;
+    for (sink, written) in sorted.sinks.iter().zip(&sorted.endings) {
+        let held = sink.arranged(lattice, schema, source.metadata());
+        let held = Bytes(held.map_err(|error| blame(&**written, error))?.unwrap_or(0));
+        let Arranging { milled, of_split } = &mut demands.arranging;
+        match () {
+            () if sink.is_split() => *of_split = held.max(*of_split),
+            // Each thread writes one at a time.
+            () if sink.is_folder() => *milled += held * threads,
+            () => *milled += held,
+        }
+    }
+    Ok(demands)
 }
 
 /// True if an output has records of a known size.
