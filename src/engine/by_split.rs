@@ -27,7 +27,7 @@ use crate::host::lock;
 use crate::point::{Metadata, PointBatch, Schema};
 use crate::report::Grouped;
 use crate::stage::{
-    ChunkSize, CreateSink, Encode, Encoded, OutputSplit, Sink, SinkSummary, SplitKey,
+    BATCH, ChunkSize, CreateSink, Encode, Encoded, OutputSplit, Sink, SinkSummary, SplitKey,
 };
 use crate::store::{RecordState, Spill, StoredStretch};
 use crate::{Error, Result};
@@ -197,20 +197,17 @@ impl BySplit {
     }
 
     /// Looks for where the records of a file are, batch by batch.
-    fn look(&self, list: &SplitList, extent: &FileExtent, batch: &mut PointBatch) -> Result<()> {
+    fn look(&self, job: &Job<'_>, list: &SplitList, extent: &FileExtent) -> Result<()> {
+        let mut batch = PointBatch::new(self.schema.clone(), BATCH);
         self.each(list, |entries| {
-            entries.chunks_exact(self.entry()).for_each(|entry| {
-                batch.extend(&entry[..self.schema.stride]);
-                if batch.len() == batch.capacity() {
-                    extent.add(batch);
-                    batch.clear();
-                }
-            });
-            Ok(())
-        })?;
-        extent.add(batch);
-        batch.clear();
-        Ok(())
+            entries.chunks(self.entry() * BATCH).try_for_each(|entries| {
+                batch.clear();
+                let records = entries.chunks_exact(self.entry());
+                records.for_each(|entry| batch.extend(&entry[..self.schema.stride]));
+                extent.add(&batch);
+                job.advance(0)
+            })
+        })
     }
 
     fn write_one(
@@ -228,7 +225,7 @@ impl BySplit {
         let by_time = by_time(job, number, create);
         let mut batch = PointBatch::new(self.schema.clone(), points);
         if let Some(extent) = FileExtent::of(job, create, &metadata)? {
-            self.look(list, &extent, &mut batch)?;
+            self.look(job, list, &extent)?;
             sink.arrange(&extent.told())?;
         }
         let mut rows = Vec::new();

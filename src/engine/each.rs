@@ -71,7 +71,10 @@ impl ByInput {
         if let Some(extent) = FileExtent::of(job, &**create, &metadata)? {
             let extent = Arc::new(extent);
             let look = encoders.looked_at_by(extent.clone());
-            self.each_chunk(rank, points, |chunk| encoder.encode(&look, &chunk).map(drop))?;
+            self.each_chunk(rank, points, |chunk| {
+                encoder.encode(&look, &chunk)?;
+                job.advance(0)
+            })?;
             sink.arrange(&extent.told())?;
         }
         let given = self.each_chunk(rank, points, |chunk| {
