@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use rayon::ThreadPool;
 
 use super::accepted::accepted;
-use super::demanded::{arranged, demands, lists_bytes};
+use super::demanded::{demands, lists_bytes};
 use super::limits::{check_limits, number_selections};
 use super::look::{Unfit, look, look_at_corners};
 use super::meshes::{connected, triangulations};
@@ -121,8 +121,7 @@ impl Graph {
         let tagger = tagger(&sorted.ops, &passes.passes, &choices, &ranks, schema, &settings)?;
         let order = WriteOrder::new(&sorted, &*source)?;
         let (lattice, doubt) = lattice(&settings, (&*source, schema), &sorted.ops, order.mills)?;
-        let demands = demands(&sorted, &passes, (&*source, schema), &order, &settings)?;
-        let demands = arranged(demands, &sorted, (&*source, schema), lattice.as_ref())?;
+        let demands = demands(&sorted, &passes, (&*source, schema), (&order, &lattice), &settings)?;
         let besides = (lists_bytes(&each, &splits, &ranks), connected(&sorted, &*source));
         let demands = divided(demands, besides, tagger.tags())?;
         let mut warnings = warnings(&*source, &sorted, &schemas, &settings)?;

@@ -125,11 +125,11 @@ pub trait Format: Send + Sync {
         None
     }
 
-    /// Given if points of its files are arranged in space: they come in canonical order, its sink is
-    /// told where they are ([`Sink::arrange`]), and chunks that are appended to it have the place of
-    /// each ([`Encoded::places`](super::Encoded::places)), which `write` adds to those that the
-    /// format encodes. The name of a format of the same family that holds the same where that cannot
-    /// be.
+    /// Given if points of its files are arranged in space: they come in canonical order, its sink
+    /// is told where they are ([`Sink::arrange`]), and chunks that are appended to it have the
+    /// place of each ([`Encoded::places`](super::Encoded::places)), which `write` adds to what the
+    /// format encodes. The name of a format of the same family that holds the same where that
+    /// cannot be.
     fn arranged(&self) -> Option<&'static str> {
         None
     }
