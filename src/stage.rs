@@ -13,6 +13,7 @@ mod sink;
 mod source;
 mod split;
 mod tile_op;
+mod triangles;
 mod unread;
 mod walk;
 mod whole;
@@ -41,12 +42,13 @@ pub use rounds::{
 pub use scan::{AnyScanOp, Gathered, ScanOp, StoredSummaries, Summary};
 pub use sink::{
     ChunkSize, CreateSink, Encode, EncodeTriangles, Encoded, Extent, Order, PointsAhead, Sink,
-    SinkSummary, Triangle, Triangulation,
+    SinkSummary,
 };
 pub(crate) use source::BATCH;
 pub use source::{Contradiction, Input, OpenSource, Part, Source};
 pub use split::{OutputSplit, SplitKey};
 pub use tile_op::{Forecast, ScanFacts, TileOp};
+pub use triangles::{Triangle, Triangulation};
 pub use unread::Unread;
 pub use walk::{PointWalk, WalkProgress};
 pub(crate) use whole::enter_error;

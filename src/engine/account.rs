@@ -6,6 +6,7 @@
 //! so a record that is lost or written twice fails the run instead of being hidden in a difference.
 
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::clock::Clock;
@@ -47,7 +48,10 @@ impl Task {
     pub(super) fn figures(&self, finished: &Finished, job: &Job<'_>) -> RunFigures {
         let mut warnings = self.source.warnings();
         let all = finished.written.iter().flatten();
-        warnings.extend(all.flat_map(|(_, sink)| sink.notes.iter().cloned()));
+        // What all of many files say is said once.
+        let mut told = BTreeSet::new();
+        let notes = all.flat_map(|(_, sink)| &sink.notes).filter(|note| told.insert(*note));
+        warnings.extend(notes.cloned());
         let outputs = self.written(finished).map(|(path, is_file, (_, summary))| {
             FileFigures::of(path, summary.points, is_file.then_some(summary.bytes))
         });

@@ -17,7 +17,7 @@ use std::ffi::OsStr;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
-use super::by_time::ByTime;
+use super::arranged::FileExtent;
 use super::job::Job;
 use super::publish::{Staged, folder_of};
 use super::row::RowLayout;
@@ -27,11 +27,11 @@ use crate::host::lock;
 use crate::point::{Metadata, PointBatch, Schema};
 use crate::report::Grouped;
 use crate::stage::{
-    ChunkSize, CreateSink, Encode, Encoded, OutputSplit, Sink, SinkSummary, SplitKey,
+    BATCH, ChunkSize, CreateSink, Encode, Encoded, OutputSplit, Sink, SinkSummary, SplitKey,
 };
 use crate::store::{RecordState, Spill, StoredStretch};
 use crate::{Error, Result};
-use sorter::{NextPlace, SplitSorter};
+use sorter::{NextPlace, SplitSorter, by_time, measured};
 
 /// Files that an output is split into at most.
 pub(crate) const MOST_FILES: usize = 16_384;
@@ -39,8 +39,6 @@ pub(crate) const MOST_FILES: usize = 16_384;
 const OPEN_BYTES: usize = 8 << 20;
 /// Bytes of a stretch at most.
 const STRETCH: usize = 256 << 10;
-/// Bytes of a file that are left for what an output says of its run, and for tables at its end.
-const RESERVE: u64 = 256 << 10;
 
 /// The records of one file that were not yet stored, and the last stretch of the others.
 #[derive(Debug, Default)]
@@ -198,6 +196,20 @@ impl BySplit {
         lock(&self.lists).files.values().map(|list| list.records).sum()
     }
 
+    /// Looks for where the records of a file are, batch by batch.
+    fn look(&self, job: &Job<'_>, list: &SplitList, extent: &FileExtent) -> Result<()> {
+        let mut batch = PointBatch::new(self.schema.clone(), BATCH);
+        self.each(list, |entries| {
+            entries.chunks(self.entry() * BATCH).try_for_each(|entries| {
+                batch.clear();
+                let records = entries.chunks_exact(self.entry());
+                records.for_each(|entry| batch.extend(&entry[..self.schema.stride]));
+                extent.add(&batch);
+                job.advance(0)
+            })
+        })
+    }
+
     fn write_one(
         &self,
         job: &Job<'_>,
@@ -212,6 +224,10 @@ impl BySplit {
         let (points, encoder) = (sink.chunk_points(), sink.encoder());
         let by_time = by_time(job, number, create);
         let mut batch = PointBatch::new(self.schema.clone(), points);
+        if let Some(extent) = FileExtent::of(job, create, &metadata)? {
+            self.look(job, list, &extent)?;
+            sink.arrange(&extent.told())?;
+        }
         let mut rows = Vec::new();
         let mut append = |batch: &mut PointBatch, rows: &mut Vec<u8>| {
             let written = batch.len();
@@ -246,29 +262,6 @@ impl BySplit {
             _ => Ok(summary),
         }
     }
-}
-
-/// How records are ordered within the chunks of a file of sink `number`, if not as they come.
-fn by_time(job: &Job<'_>, number: usize, create: &dyn CreateSink) -> Option<ByTime> {
-    let task = job.task;
-    let in_chunks = task.mills && !task.in_input_order[number] && create.likes_time();
-    in_chunks.then(|| ByTime::of(task.schema())).flatten()
-}
-
-/// What sorts records into files of `bytes` at most: what a file takes without points, an empty one
-/// tells.
-fn measured(job: &Job<'_>, number: usize, split: &OutputSplit, bytes: u64) -> Result<SplitSorter> {
-    let missing = || Error::internal("an output that is split has no place");
-    let create = job.task.sinks[number].of_split([1, 0], split)?;
-    let empty = job.outputs[number].first().ok_or_else(missing)?.scratch().path("empty")?;
-    let metadata = job.task.metadata(number, Some(job.task.pipeline(number)));
-    let sink = create.create(&empty, job.task.schema(), &metadata, false)?;
-    let encoder = sink.encoder();
-    let taken = sink.finish()?.bytes.saturating_add(RESERVE);
-    std::fs::remove_file(&empty).map_err(|e| Error::io(&empty, "remove it", e))?;
-    // Tables of chunks and checksums of pages grow with the points.
-    let room = bytes.saturating_sub(taken) / 100 * 99;
-    Ok(SplitSorter::Bytes(room, encoder, by_time(job, number, &*create)))
 }
 
 /// What to say of files whose names are those of files of a split, and which are not among those

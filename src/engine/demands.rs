@@ -35,6 +35,8 @@ const ENCODED: u64 = 4;
 /// Fifths of a stream's queues that are in use.
 const STREAMED: u64 = 3;
 
+/// What is leased for outputs that arrange points.
+const ARRANGING: &str = "arranging of points";
 /// What is leased for what stages hold of the whole scan.
 pub(super) const HELD_OF_SCAN: &str = "stages that need the whole scan";
 
@@ -144,14 +146,17 @@ impl Demands {
             true => Loader::dimension_bytes(self.stride),
             false => Bytes(0),
         };
-        Holders::of([
+        let milled = self.arranging.milled;
+        let arranging = (milled > Bytes(0)).then_some((ARRANGING, milled));
+        let all = [
             ("queue of chunks", self.by_threads(chunks)),
             ("encoding of chunks", self.by_threads(encoding)),
             ("comparison with grids", self.by_threads(Bytes(baseline))),
             ("search beyond tiles", self.by_threads(Bytes(Remote::BYTES))),
             ("streaming behind tiles", self.by_threads(filters)),
             ("reading of dimensions", self.by_threads(dimensions)),
-        ])
+        ];
+        Holders::of(all.into_iter().chain(arranging))
     }
 
     fn other_sinks(&self) -> u64 {
@@ -172,10 +177,18 @@ impl Demands {
         ])
     }
 
+    /// True if the files of a split arrange points.
+    fn arranges_split(&self) -> bool {
+        self.arranging.of_split > Bytes(0)
+    }
+
     /// What is held while the files of a split are written.
     pub fn splitting(&self) -> Holders {
         let writing = writing_bytes(self.chunk, self.stride + self.columns.row);
-        Holders::of([("writing of split files", self.by_threads(writing))])
+        let arranged = (ARRANGING, self.by_threads(self.arranging.of_split));
+        let arranging = self.arranges_split().then_some(arranged);
+        let writing = ("writing of split files", self.by_threads(writing));
+        Holders::of([writing].into_iter().chain(arranging))
     }
 
     /// Bytes of a tile per position it holds, the product that it leaves behind included.
@@ -224,6 +237,7 @@ impl Demands {
             .larger(self.merge(run_records))
             .larger(survey)
             .larger(if self.ranked { self.ordering() } else { Holders::default() })
+            .larger(if self.arranges_split() { self.splitting() } else { Holders::default() })
     }
 
     /// The most memory that the process is expected to hold at once: what is leased less the parts

@@ -5,6 +5,9 @@
 //! many open files and half-filled chunks. Written behind the last tile, no more are open than
 //! there are threads.
 
+use std::sync::Arc;
+
+use super::arranged::FileExtent;
 use super::by_input::ByInput;
 use super::chunk::{Open, OutputChunk};
 use super::encoding::{ChunkEncoder, ChunkEncoders};
@@ -63,20 +66,41 @@ impl ByInput {
         let note = job.note(number, create.path());
         let metadata = Metadata { pipeline, note, computed, ..said };
         let mut sink = create.create(staged.file(), task.schema(), &metadata, false)?;
+        let points = sink.chunk_points();
         let encoders = ChunkEncoders::of_one(job, tiles, number, &*sink, create.likes_time());
-        let mut open = Open::new(0, sink.chunk_points(), &self.layout, false);
-        let (mut given, mut full) = (0, Vec::new());
-        let mut append = |chunk: OutputChunk| {
+        if let Some(extent) = FileExtent::of(job, &**create, &metadata)? {
+            let extent = Arc::new(extent);
+            let look = encoders.looked_at_by(extent.clone());
+            self.each_chunk(rank, points, |chunk| {
+                encoder.encode(&look, &chunk)?;
+                job.advance(0)
+            })?;
+            sink.arrange(&extent.told())?;
+        }
+        let given = self.each_chunk(rank, points, |chunk| {
             let (_, encoded) = encoder.encode(&encoders, &chunk)?;
             sink.append(encoded)?;
             job.advance(0)
-        };
+        })?;
+        Ok((given, sink.finish()?))
+    }
+
+    /// Calls `visit` with the records of the input of `rank` in chunks of so many; how many there
+    /// were.
+    fn each_chunk(
+        &self,
+        rank: usize,
+        points: usize,
+        mut visit: impl FnMut(OutputChunk) -> Result<()>,
+    ) -> Result<u64> {
+        let mut open = Open::new(0, points, &self.layout, false);
+        let (mut given, mut full) = (0, Vec::new());
         self.each(rank, |entry: &RecordEntry, row| {
             given += u64::from(entry.count);
             open.take(entry, row, &mut full);
-            full.drain(..).try_for_each(&mut append)
+            full.drain(..).try_for_each(&mut visit)
         })?;
-        open.rest().map_or(Ok(()), append)?;
-        Ok((given, sink.finish()?))
+        open.rest().map_or(Ok(()), visit)?;
+        Ok(given)
     }
 }

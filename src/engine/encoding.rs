@@ -76,6 +76,18 @@ impl<'a> ChunkEncoders<'a> {
         ChunkEncoders { stored: true, ..self }
     }
 
+    /// For the chunks of the same output, which `encoder` looks at before they are written: they
+    /// are counted and ordered then.
+    pub fn looked_at_by(&self, encoder: Arc<dyn Encode>) -> Self {
+        ChunkEncoders {
+            encoders: vec![encoder],
+            by_time: vec![None],
+            changed_by: self.changed_by.clone(),
+            counted: vec![false],
+            ..*self
+        }
+    }
+
     /// What a thread holds to encode them.
     pub fn one(&self) -> ChunkEncoder {
         ChunkEncoder::new(self.job, self.chunk_points)

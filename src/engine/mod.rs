@@ -6,6 +6,7 @@
 //! together in the order of the items and not in that of the threads.
 
 mod account;
+mod arranged;
 pub(crate) mod beside;
 pub(crate) mod by_input;
 pub(crate) mod by_rank;

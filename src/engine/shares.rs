@@ -43,6 +43,8 @@ pub struct Demands {
     pub sinks: usize,
     /// Bytes of the lists of records by input, where each input has an output of its own.
     pub lists: Bytes,
+    /// What open outputs that arrange points hold besides their chunks.
+    pub arranging: Arranging,
     /// True if the run needs tiles; else it streams.
     pub mills: bool,
     /// True if records have tags.
@@ -68,6 +70,15 @@ pub struct Demands {
     pub columns: ColumnBytes,
     /// What the stages of each pass need.
     pub passes: Vec<Vec<Needs>>,
+}
+
+/// Bytes that outputs which arrange points hold besides their chunks while they are open.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Arranging {
+    /// All that grow while tiles are milled.
+    pub milled: Bytes,
+    /// A file of a split, of which each thread writes one.
+    pub of_split: Bytes,
 }
 
 /// The division.
@@ -105,6 +116,7 @@ impl Demands {
             chunk,
             sinks: chunks.len(),
             lists: Bytes(0),
+            arranging: Arranging::default(),
             mills: false,
             tagged: false,
             ranked: false,

@@ -8,8 +8,9 @@ use super::passes::Passes;
 use super::sorted::{Sorted, blame};
 use crate::budget::Bytes;
 use crate::engine::pass::{ColumnBytes, Op, Pass, standings};
-use crate::engine::shares::Demands;
+use crate::engine::shares::{Arranging, Demands};
 use crate::engine::{by_input, by_rank, by_split};
+use crate::geom::lattice::Lattice;
 use crate::graph::{MOST_THREADS, RunSettings};
 use crate::host::process::{default_memory, processors};
 use crate::point::{ComputedDimension, Metadata, Schema};
@@ -22,15 +23,18 @@ pub(super) fn demands(
     sorted: &Sorted,
     Passes { passes, computed, .. }: &Passes,
     (source, schema): (&dyn Source, &Arc<Schema>),
-    order: &WriteOrder,
+    (order, lattice): (&WriteOrder, &Option<Lattice>),
     settings: &RunSettings,
 ) -> Result<Demands> {
+    let threads = threads(settings)?;
     let limit = settings.memory.unwrap_or_else(default_memory);
     let chunks = chunks(sorted, computed, (source, schema))?;
     let columns = passes.iter().map(|pass| pass.column_bytes(computed));
     let ranked =
         order.in_input_order.iter().filter(|ranked| **ranked && order.mills).count() as u64;
+    let arranging = lattice.as_ref().map(|on| arranging(sorted, (source, schema), on, threads));
     Ok(Demands {
+        arranging: arranging.transpose()?.unwrap_or_default(),
         lists: by_rank::lists_bytes(source.points()) * ranked,
         ranked: ranked > 0,
         mills: order.mills,
@@ -46,8 +50,30 @@ pub(super) fn demands(
             .ops
             .iter()
             .any(|stage| stage.op.tile().needs().cells || matches!(stage.op, Op::Round(_))),
-        ..Demands::of(source, &chunks, limit, threads(settings)?)
+        ..Demands::of(source, &chunks, limit, threads)
     })
+}
+
+/// What open outputs hold that arrange points on `lattice`.
+fn arranging(
+    sorted: &Sorted,
+    (source, schema): (&dyn Source, &Arc<Schema>),
+    lattice: &Lattice,
+    threads: usize,
+) -> Result<Arranging> {
+    let mut arranging = Arranging::default();
+    for (sink, written) in sorted.sinks.iter().zip(&sorted.endings) {
+        let held = sink.arranged(lattice, schema, source.metadata());
+        let held = Bytes(held.map_err(|error| blame(&**written, error))?.unwrap_or(0));
+        let Arranging { milled, of_split } = &mut arranging;
+        match () {
+            () if sink.is_split() => *of_split = held.max(*of_split),
+            // Each thread writes one at a time.
+            () if sink.is_folder() => *milled += held * threads as u64,
+            () => *milled += held,
+        }
+    }
+    Ok(arranging)
 }
 
 /// True if an output has records of a known size.

@@ -121,7 +121,7 @@ impl Graph {
         let tagger = tagger(&sorted.ops, &passes.passes, &choices, &ranks, schema, &settings)?;
         let order = WriteOrder::new(&sorted, &*source)?;
         let (lattice, doubt) = lattice(&settings, (&*source, schema), &sorted.ops, order.mills)?;
-        let demands = demands(&sorted, &passes, (&*source, schema), &order, &settings)?;
+        let demands = demands(&sorted, &passes, (&*source, schema), (&order, &lattice), &settings)?;
         let besides = (lists_bytes(&each, &splits, &ranks), connected(&sorted, &*source));
         let demands = divided(demands, besides, tagger.tags())?;
         let mut warnings = warnings(&*source, &sorted, &schemas, &settings)?;

@@ -14,8 +14,8 @@ use crate::io::ends::CountedSink;
 use crate::memory::Records;
 use crate::point::{Metadata, Schema, Units};
 use crate::stage::{
-    ChunkSize, CreateSink, Encode, EncodeTriangles, Encoded, Extent, Order, PointsAhead, Role,
-    Sink, SinkSummary, Source, Triangulation,
+    ChunkSize, CreateSink, Encode, EncodeTriangles, Encoded, Extent, Lattice, Order, PointsAhead,
+    Role, Sink, SinkSummary, Source, Triangulation,
 };
 
 /// What each sink was given, by its number among the sinks.
@@ -146,6 +146,15 @@ impl CreateSink for RehearsedSink {
 
     fn chunk(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<ChunkSize> {
         self.sink.chunk(schema, metadata)
+    }
+
+    fn arranged(
+        &self,
+        lattice: &Lattice,
+        schema: &Arc<Schema>,
+        metadata: &Metadata,
+    ) -> Result<Option<u64>> {
+        self.sink.arranged(lattice, schema, metadata)
     }
 
     fn create(

@@ -125,9 +125,11 @@ pub trait Format: Send + Sync {
         None
     }
 
-    /// Given if an output of it is one file whose points are arranged in space: it comes in
-    /// canonical order, and its sink is told where the points are ([`Sink::arrange`]). The name of
-    /// a format of the same family that holds the same where that cannot be.
+    /// Given if points of its files are arranged in space: they come in canonical order, its sink
+    /// is told where they are ([`Sink::arrange`]), and chunks that are appended to it have the
+    /// place of each ([`Encoded::places`](super::Encoded::places)), which `write` adds to what the
+    /// format encodes. The name of a format of the same family that holds the same where that
+    /// cannot be.
     fn arranged(&self) -> Option<&'static str> {
         None
     }
@@ -208,6 +210,21 @@ pub trait Format: Send + Sync {
         metadata: &Metadata,
         whole: bool,
     ) -> Result<Box<dyn Sink>>;
+
+    /// Bytes that an open output holds besides its chunks, where its points are
+    /// [arranged](Format::arranged).
+    ///
+    /// # Errors
+    ///
+    /// As [`chunk`](Format::chunk).
+    fn arranging_bytes(
+        &self,
+        _keys: &WriteKeys,
+        _schema: &Arc<Schema>,
+        _metadata: &Metadata,
+    ) -> Result<u64> {
+        Ok(0)
+    }
 
     /// See [`CreateSink::disk_bytes`](super::CreateSink::disk_bytes).
     ///

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use super::source::{Input, Source};
 use super::split::{OutputSplit, SplitKey};
+use super::triangles::{Triangle, Triangulation};
 use super::walk::PointWalk;
 use crate::geom::lattice::Lattice;
 use crate::point::{Bounds, Metadata, PointBatch, Position, Schema, Units};
@@ -25,8 +26,9 @@ pub trait Sink: Send {
     /// The encoder, shared by all threads.
     fn encoder(&self) -> Arc<dyn Encode>;
 
-    /// Told once, before the first chunk, where the points are, if the output is the only one of
-    /// all inputs and its records come in [canonical order](Order::Canonical).
+    /// Told once, before the first chunk, where its points are, if its records come in
+    /// [canonical order](Order::Canonical); one of several files only where it
+    /// [arranges](CreateSink::arranged) them.
     ///
     /// # Errors
     ///
@@ -67,7 +69,8 @@ pub trait Sink: Send {
 pub struct Extent {
     /// The lattice: records come in Morton order of their positions on it.
     pub lattice: Lattice,
-    /// The box of the positions of all points that were read; empty if there are none.
+    /// The box of the positions of all points that were read, or of those of the file where it is
+    /// one of several; empty if there are none.
     pub bounds: Bounds,
 }
 
@@ -88,16 +91,6 @@ pub trait Encode: Send + Sync {
     fn encode(&self, batch: &PointBatch) -> Result<Encoded>;
 }
 
-/// A triangle of a mesh over a plane, counter-clockwise as it is seen from the side that the axis
-/// across the plane points to.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Triangle {
-    /// The numbers of its corners among the points of the output, from 0.
-    pub corners: [u64; 3],
-    /// Where these are, in world units.
-    pub places: [[f64; 3]; 3],
-}
-
 /// The part of a sink that writes triangles and runs on several threads at once.
 pub trait EncodeTriangles: Send + Sync {
     /// Encodes triangles.
@@ -106,15 +99,6 @@ pub trait EncodeTriangles: Send + Sync {
     ///
     /// A corner that the format cannot refer to.
     fn encode(&self, triangles: &[Triangle]) -> Result<Encoded>;
-}
-
-/// How the points of an output are connected: their Delaunay triangulation in a plane.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Triangulation {
-    /// The axis across the plane: 0, 1 or 2.
-    pub axis: usize,
-    /// The largest radius of a triangle's circle, in the unit of the scan; none: any.
-    pub max_radius: Option<f64>,
 }
 
 /// An encoded chunk and the figures that a header needs.
@@ -280,6 +264,24 @@ pub trait CreateSink: Send + Sync {
     /// the output is smaller then.
     fn likes_time(&self) -> bool {
         false
+    }
+
+    /// Given if its points are arranged in space, for which its sink is told where they are
+    /// ([`Sink::arrange`]): the bytes that it holds for that, besides its chunks, while it is open.
+    /// Such an output has the canonical [order](CreateSink::order), and its chunks have
+    /// [places](Encoded::places).
+    ///
+    /// # Errors
+    ///
+    /// A `lattice` whose steps are not of one length in the unit of the coordinates, and as
+    /// [`chunk`](CreateSink::chunk).
+    fn arranged(
+        &self,
+        _lattice: &Lattice,
+        _schema: &Arc<Schema>,
+        _metadata: &Metadata,
+    ) -> Result<Option<u64>> {
+        Ok(None)
     }
 
     /// True if its records still refer to the file beside the input ([`Input::beside`]), so that a

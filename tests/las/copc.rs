@@ -14,7 +14,7 @@ use crate::support::scan::Scan;
 
 /// What the nodes of a file hold, after it was looked at that all is as COPC has it: the points of
 /// each level.
-fn levels(path: &Path) -> Vec<u64> {
+pub fn levels(path: &Path) -> Vec<u64> {
     let mut reader = CopcReader::from_path(path).unwrap();
     let header = reader.header().clone();
     assert!([6, 7, 8].contains(&header.point_format().to_u8().unwrap()));
@@ -210,9 +210,15 @@ fn what_copc_cannot_be_is_refused() {
     fails(at, &[&copc[..], &["--point-format", "1"]].concat(), 2, &["no point format 1", "6, 7"]);
     let ordered = ["reduce", "a.laz", "-o", "b.copc.laz", "--order", "input"];
     fails(at, &ordered, 2, &["--order", "order of its own"]);
-    fails(at, &["reduce", "a.laz", "--outdir", "o", "--to", "copc"], 2, &["one file", "laz"]);
-    let run = |text: &str, parts: &[&str]| fails(at, &["run", text], 2, parts);
-    run("read a.laz ! write \"{x}_{y}.copc.laz\" side=100", &["as one file, not as several"]);
+    let ordered = ["run", "read a.laz ! write folder=o format=copc order=input"];
+    fails(at, &ordered, 2, &["order of its own"]);
+    let bytes = ["run", "read a.laz ! write \"{number}.copc.laz\" bytes=1MB"];
+    fails(at, &bytes, 2, &["known when a file of it is complete", "write.points"]);
+    for write in ["write b.copc.laz", "write \"{x}_{y}.copc.laz\" side=100"] {
+        let text = format!("read a.laz ! grid side=1 ! {write}");
+        let stretched = ["run", &text, "--set", "run.z_scale=3"];
+        fails(at, &stretched, 2, &["COPC has cubes in the unit of the coordinates"]);
+    }
     let smooth = "read a.laz ! normals ! smooth ! write s.copc.laz";
     let (code, _, told) = pointmill(at, &["run", smooth]);
     assert_eq!(code, 2, "{told}");

@@ -1,6 +1,7 @@
 //! LAS and LAZ files.
 
 mod copc;
+mod copc_files;
 mod formats;
 mod holes;
 mod merge;

@@ -166,7 +166,7 @@ fn splits_that_cannot_be_are_refused() {
             "`write.folder` has a file for each input",
             "{number}.laz",
         ),
-        (format!("{}\npoints = 1", path("{number}.copc.laz")), "as one file", "write `laz`"),
+        (format!("{}\nbytes = 1", path("{number}.copc.laz")), "is complete", "`write.points`"),
     ] {
         let error = run("", &input, "", &write).unwrap_err();
         let all = format!("{error} {}", error.remedy().unwrap_or_default());

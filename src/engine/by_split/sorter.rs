@@ -3,12 +3,15 @@
 use std::sync::Arc;
 
 use super::super::by_time::ByTime;
+use super::super::job::Job;
 use crate::budget::Bytes;
 use crate::point::{Dimension, Endian, PointBatch};
-use crate::stage::{Encode, SplitKey};
+use crate::stage::{CreateSink, Encode, OutputSplit, SplitKey};
 use crate::store::RecordState;
 use crate::{Error, Result};
 
+/// Bytes of a file that are left for what an output says of its run, and for tables at its end.
+const RESERVE: u64 = 256 << 10;
 /// Sides from the origin at most: whole numbers are exact in a `f64` up to here.
 const FARTHEST: f64 = (1u64 << 52) as f64;
 /// What sides are short of a whole number by, at most, if they are it: decimals are seldom exact in
@@ -61,6 +64,34 @@ impl SplitSorter {
         };
         Ok(encoded.bytes.len() as u64)
     }
+}
+
+/// How records are ordered within the chunks of a file of sink `number`, if not as they come.
+pub(super) fn by_time(job: &Job<'_>, number: usize, create: &dyn CreateSink) -> Option<ByTime> {
+    let task = job.task;
+    let in_chunks = task.mills && !task.in_input_order[number] && create.likes_time();
+    in_chunks.then(|| ByTime::of(task.schema())).flatten()
+}
+
+/// What sorts records into files of `bytes` at most: what a file takes without points, an empty one
+/// tells.
+pub(super) fn measured(
+    job: &Job<'_>,
+    number: usize,
+    split: &OutputSplit,
+    bytes: u64,
+) -> Result<SplitSorter> {
+    let missing = || Error::internal("an output that is split has no place");
+    let create = job.task.sinks[number].of_split([1, 0], split)?;
+    let empty = job.outputs[number].first().ok_or_else(missing)?.scratch().path("empty")?;
+    let metadata = job.task.metadata(number, Some(job.task.pipeline(number)));
+    let sink = create.create(&empty, job.task.schema(), &metadata, false)?;
+    let encoder = sink.encoder();
+    let taken = sink.finish()?.bytes.saturating_add(RESERVE);
+    std::fs::remove_file(&empty).map_err(|e| Error::io(&empty, "remove it", e))?;
+    // Tables of chunks and checksums of pages grow with the points.
+    let room = bytes.saturating_sub(taken) / 100 * 99;
+    Ok(SplitSorter::Bytes(room, encoder, by_time(job, number, &*create)))
 }
 
 /// The square of a position.

@@ -19,6 +19,7 @@ fn demands(limit: u64) -> Demands {
         chunk: ChunkSize { points: 50_000, bytes: 4_500_000 },
         sinks: 1,
         lists: Bytes(0),
+        arranging: Arranging::default(),
         mills: true,
         tagged: false,
         ranked: false,

@@ -6,6 +6,7 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::placed::PlacedSink;
 use super::reshaped::Reshaped;
 use super::settled::settled;
 use crate::error::shown;
@@ -17,8 +18,8 @@ use crate::point::{Metadata, PointBatch, Schema};
 #[cfg(feature = "proj")]
 use crate::quantity::Setting;
 use crate::stage::{
-    ChunkSize, CreateSink, Format, Formats, OpenSource, Order, PointsAhead, ReadKeys, Sink, Source,
-    WriteKeys,
+    ChunkSize, CreateSink, Format, Formats, Lattice, OpenSource, Order, PointsAhead, ReadKeys,
+    Sink, Source, WriteKeys,
 };
 use crate::{Error, Result};
 
@@ -150,7 +151,28 @@ impl CreateSink for OutputFile {
         let chunk = Reshaped::of(&self.keys, schema)
             .and_then(|asked| self.format.chunk(&asked.keys, &asked.schema, metadata));
         let chunk = chunk.map_err(|error| error.at(&self.keys.path))?;
-        Ok(if self.of_one { chunk.and_records(schema.stride) } else { chunk })
+        let chunk = if self.of_one { chunk.and_records(schema.stride) } else { chunk };
+        Ok(if self.format.arranged().is_some() { PlacedSink::chunk(chunk) } else { chunk })
+    }
+
+    fn arranged(
+        &self,
+        lattice: &Lattice,
+        schema: &Arc<Schema>,
+        metadata: &Metadata,
+    ) -> Result<Option<u64>> {
+        if self.format.arranged().is_none() {
+            return Ok(None);
+        }
+        if lattice.z_scale() != 1.0 {
+            let told = format!(
+                "{} has cubes in the unit of the coordinates, and z has another than x and y",
+                self.format.name().to_uppercase()
+            );
+            return Err(Error::pipeline(told).help("leave `run.z_scale` out, or write LAZ"));
+        }
+        let asked = Reshaped::of(&self.keys, schema)?;
+        self.format.arranging_bytes(&asked.keys, &asked.schema, metadata).map(Some)
     }
 
     fn disk_bytes(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<[u64; 2]> {
@@ -211,7 +233,11 @@ impl CreateSink for OutputFile {
             Some(from) => from.of_one(staged, schema, metadata, &create),
             None => create(schema),
         };
-        created.map_err(|error| of_output(error, staged, &self.keys.path))
+        let created = created.map_err(|error| of_output(error, staged, &self.keys.path))?;
+        Ok(match self.format.arranged() {
+            Some(_) => Box::new(PlacedSink::new(created)),
+            None => created,
+        })
     }
 }
 

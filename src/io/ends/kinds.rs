@@ -207,12 +207,12 @@ pub type ScanNumber = Whole<1, 65_535>;
 /// are not written; the stage `mesh` writes triangles.
 ///
 /// COPC 1.0 (`.copc.laz`) is written from any pipeline that does not move points behind its tiles:
-/// as one file, in point format 6, 7 or 8 (older ones become these; waveforms must be dropped).
-/// Each level of its octree is a picture of the whole: of the points of a cell, of which a node has
-/// 128 a side, one stands for the cell in the node or above it: the one that `graded` kept first,
-/// where the points have its `KeepRank`, else one that a hash of the positions chooses. A subtree
-/// of up to 65,536 points is one node. The bytes are a function of the points alone, and records
-/// within a node are ordered by GPS time.
+/// in point format 6, 7 or 8 (older ones become these; waveforms must be dropped). Each level of
+/// its octree is a picture of the whole: of the points of a cell, of which a node has 128 a side,
+/// one stands for the cell in the node or above it: the one that `graded` kept first, where the
+/// points have its `KeepRank`, else one that a hash of the positions chooses. A subtree of up to
+/// 65,536 points is one node. The bytes are a function of the points alone, and records within a
+/// node are ordered by GPS time.
 ///
 /// LAS header fields that depend on the points are computed again. The generating software is
 /// pointmill and its version. Where records went through stages, the system identifier is
@@ -229,10 +229,10 @@ pub type ScanNumber = Whole<1, 65_535>;
 /// `pointmill reproduce` makes it again; `run.provenance = false` leaves that out.
 ///
 /// With `path` all inputs become one file. With `folder` each input becomes a file of its own
-/// there: under its name (`.copc.laz` becoming `.laz`, for COPC is one file), with its header, its
-/// records and its offset, holding those of its points that are kept, even if that is none. The
-/// inputs are one scan all the same: neighbourhoods and cells go on from file to file, and the
-/// outputs together have the points that the one file would have.
+/// there: under its name, with its header, its records and its offset, holding those of its points
+/// that are kept, even if that is none. `format = "copc"` makes each a COPC file; without it
+/// `.copc.laz` becomes `.laz`. The inputs are one scan all the same: neighbourhoods and cells go on
+/// from file to file, and the outputs together have the points that the one file would have.
 ///
 /// # Splitting
 ///
@@ -250,6 +250,12 @@ pub type ScanNumber = Whole<1, 65_535>;
 /// With `by` there is a file for each value of a dimension whose numbers are whole:
 /// `path = "lines/{value}.laz"` with `by = "PointSourceId"` writes a file for each flight line, and
 /// with `by = "Classification"` one for each class.
+///
+/// Each of such files may be COPC, as `path = "tiles/{x}_{y}.copc.laz"` with `side = "500 m"`: an
+/// octree of its own around its points, byte for byte the one that these points alone would become,
+/// whatever other files there are. With `points` COPC files hold so many points that follow each
+/// other in canonical order, which keeps neighbours together; `bytes` is refused, since the length
+/// of COPC is known when it is complete.
 ///
 /// With `points` a file has so many points, and the last what is left: `path = "part_{number}.laz"`
 /// with `points = "10M"` writes `part_0001.laz` and so on. With `bytes` a file is no longer than

@@ -12,6 +12,7 @@ mod mesh;
 #[cfg(feature = "cli")]
 mod mirror;
 mod outputs;
+mod placed;
 mod reshaped;
 mod roles;
 mod settled;

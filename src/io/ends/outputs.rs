@@ -12,8 +12,8 @@ use crate::error::shown;
 use crate::host::standard;
 use crate::point::{Metadata, PointBatch, Schema};
 use crate::stage::{
-    ChunkSize, CreateSink, Format, Formats, Input, Order, PointsAhead, ReadKeys, Sink, Source,
-    WriteKeys,
+    ChunkSize, CreateSink, Format, Formats, Input, Lattice, Order, PointsAhead, ReadKeys, Sink,
+    Source, WriteKeys,
 };
 use crate::{Error, ErrorKind, Result};
 
@@ -80,8 +80,8 @@ impl Outputs {
         }
         let told = self.formats.of(input);
         let unknown = || unknown_extension(input, "write.format", &self.formats);
-        let format = self.format.as_ref().or(told).ok_or_else(unknown)?;
-        let format = self.formats.unarranged(format);
+        let own = || told.map(|told| self.formats.unarranged(told));
+        let format = self.format.as_ref().or_else(own).ok_or_else(unknown)?;
         let (Some(name), Some(stem)) = (input.file_name(), self.formats.stem(input)) else {
             return Err(Error::pipeline("the input has no name for its output").at(input));
         };
@@ -154,6 +154,17 @@ impl CreateSink for Outputs {
             largest.bytes = largest.bytes.max(chunk.bytes);
         }
         Ok(largest)
+    }
+
+    fn arranged(
+        &self,
+        lattice: &Lattice,
+        schema: &Arc<Schema>,
+        metadata: &Metadata,
+    ) -> Result<Option<u64>> {
+        let possible = self.possible(schema);
+        let held = possible.iter().map(|output| output.arranged(lattice, schema, metadata));
+        Ok(held.collect::<Result<Vec<_>>>()?.into_iter().max().flatten())
     }
 
     fn disk_bytes(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<[u64; 2]> {

@@ -140,28 +140,29 @@ impl Write {
             let unknown = unknown_extension(&path, "write.format", formats);
             return Err(at.blame("path", unknown));
         };
-        if let Some(other) = format.arranged() {
-            let is = format.name().to_uppercase();
-            if self.order == Some(OutputOrder::Input) {
-                let told = format!("{is} has an order of its own, not that of the input");
-                return Err(at.blame("order", Error::pipeline(told)));
-            }
-            if let Some((key, _)) = self.splits().first() {
-                let told = format!("{is} is written as one file, not as several");
-                let help = format!("write `{other}`, and convert the files");
-                return Err(at.blame(key, Error::pipeline(told).help(help)));
-            }
-        }
+        let order = self.order_in(&**format, at)?;
         let keys = self.keys(path);
         let checked = check(&keys, &**format, formats);
         checked.map_err(|(key, error)| at.blame(key, error))?;
         let (format, formats) = (format.clone(), formats.clone());
-        let order = match format.arranged() {
-            Some(_) => Order::Canonical,
-            None => self.stage_order(),
-        };
         let file = connect::OutputFile { keys, order, format, formats, of_one: false };
         self.split(file, at)
+    }
+
+    /// The order of the records in files of `format`.
+    fn order_in(&self, format: &dyn Format, at: &StagePlace) -> Result<Order> {
+        let Some(other) = format.arranged() else { return Ok(self.stage_order()) };
+        let is = format.name().to_uppercase();
+        if self.order == Some(OutputOrder::Input) {
+            let told = format!("{is} has an order of its own, not that of the input");
+            return Err(at.blame("order", Error::pipeline(told)));
+        }
+        if self.bytes.is_some() {
+            let told = format!("how many bytes {is} takes is known when a file of it is complete");
+            let help = format!("give `write.points` instead, or write `{other}`");
+            return Err(at.blame("bytes", Error::pipeline(told).help(help)));
+        }
+        Ok(Order::Canonical)
     }
 
     /// The sink of `file`, or of several into which it is split.
@@ -206,17 +207,12 @@ impl Write {
         }
         let asked = self.format.as_ref().map(|name| formats.named(name)).transpose()?;
         let keys = self.keys(folder);
-        if let Some(other) = asked.and_then(|format| format.arranged()) {
-            let is = asked.map_or("", |format| format.name()).to_uppercase();
-            let told = format!("{is} is written as one file, not as one for each input");
-            let help = format!("write `{other}`, or one file after the other by `convert`");
-            return Err(at.blame("folder", Error::pipeline(told).help(help)));
-        }
         if let Some(format) = asked {
             let checked = check(&keys, &**format, formats);
             checked.map_err(|(key, error)| at.blame(key, error))?;
         }
-        let (order, format) = (self.stage_order(), asked.cloned());
+        let order = asked.map(|format| self.order_in(&**format, at)).transpose()?;
+        let (order, format) = (order.unwrap_or(self.stage_order()), asked.cloned());
         Ok(Role::Sink(Box::new(Outputs { keys, order, format, formats: formats.clone() })))
     }
 }

@@ -10,7 +10,8 @@ use crate::error::{nearest, shown};
 use crate::point::{Metadata, PointBatch, Schema, Units};
 use crate::quantity::Length;
 use crate::stage::{
-    ChunkSize, CreateSink, Order, OutputSplit, PointsAhead, Sink, Source, SplitKey, WriteKeys,
+    ChunkSize, CreateSink, Lattice, Order, OutputSplit, PointsAhead, Sink, Source, SplitKey,
+    WriteKeys,
 };
 use crate::{Error, Result};
 
@@ -247,6 +248,15 @@ impl CreateSink for SplitFiles {
             SplitBy::Bytes(_) => chunk.and_records(schema.stride),
             _ => chunk,
         })
+    }
+
+    fn arranged(
+        &self,
+        lattice: &Lattice,
+        schema: &Arc<Schema>,
+        metadata: &Metadata,
+    ) -> Result<Option<u64>> {
+        self.file.arranged(lattice, schema, metadata)
     }
 
     fn disk_bytes(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<[u64; 2]> {

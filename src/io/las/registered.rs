@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::copc::{self, PlacedSink};
+use super::copc;
 use super::format::{FAMILY, format_of};
 use super::header::{CALLED, SIGNATURE};
 use super::native::lost;
@@ -139,11 +139,10 @@ impl Format for LasFormat {
             Form::Octree => copc::sink::chunk(&options, &target.schema)?,
             _ => sink::chunk(&options, &target.schema)?,
         };
-        let chunk = match target.projection {
+        Ok(match target.projection {
             Some(_) => Projected::chunk(chunk, &target.schema),
             None => chunk,
-        };
-        Ok(if self.form == Form::Octree { PlacedSink::chunk(chunk) } else { chunk })
+        })
     }
 
     fn create(
@@ -160,14 +159,20 @@ impl Format for LasFormat {
             Form::Octree => copc::sink::create(staged, &options, &schema, &metadata)?,
             _ => sink::create(staged, &options, &schema, &metadata)?,
         };
-        let sink: Box<dyn Sink> = match projection {
+        Ok(match projection {
             Some(projection) => Box::new(Projected::new(sink, projection, schema, &keys.path)),
             None => sink,
-        };
-        Ok(match self.form {
-            Form::Octree => Box::new(PlacedSink::new(sink)),
-            _ => sink,
         })
+    }
+
+    fn arranging_bytes(
+        &self,
+        keys: &WriteKeys,
+        schema: &Arc<Schema>,
+        metadata: &Metadata,
+    ) -> Result<u64> {
+        let target = self.target(keys, schema, metadata)?;
+        copc::sink::arranging_bytes(&self.options(metadata), &target.schema)
     }
 
     fn disk_bytes(

@@ -7,14 +7,12 @@ mod nodes;
 mod octree;
 mod overflow;
 mod packing;
-mod placed;
 pub mod rules;
 pub mod selected;
 pub mod sink;
 pub mod validate;
 
 pub use names::{EXTENSION, POINT_FORMATS, USER};
-pub use placed::PlacedSink;
 
 use crate::point::{Schema, names as n};
 use crate::{Error, Result};

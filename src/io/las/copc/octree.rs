@@ -34,6 +34,10 @@ const CELLS: u32 = 7;
 const DEEPEST: u32 = 24;
 /// A subtree of so many points is one node.
 pub const LEAF_POINTS: usize = 1 << 16;
+/// Pieces of so many points that open nodes hold, about: a piece for each level on which nodes have
+/// others below them, with the room that vectors leave; a level more quadruples the points of a
+/// surface.
+pub const HELD_PIECES: usize = 10;
 /// A node of fewer points below another is part of that.
 const FEWEST_POINTS: usize = 1 << 11;
 

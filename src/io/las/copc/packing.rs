@@ -19,6 +19,8 @@ use crate::{Error, Result};
 
 /// Nodes that wait at most, before the thread that adds one compresses one.
 const WAITING: usize = 4;
+/// Nodes that wait and are compressed at most, about, each of as many records as a piece has.
+pub const HELD_NODES: usize = WAITING + 2;
 /// Bits that the place of a record in its piece takes.
 const PLACE_BITS: u32 = 28;
 const _: () = assert!(LEAF_POINTS < 1 << PLACE_BITS);

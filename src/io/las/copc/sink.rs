@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use super::hierarchy::{Hierarchy, NodeChunk, ROOT, extended};
 use super::names::{HIERARCHY, INFO, INFO_AT, INFO_BYTES, POINT_FORMATS, TIME, USER};
-use super::octree::{LEAF_POINTS, Octree, RootCube, rank};
+use super::octree::{HELD_PIECES, LEAF_POINTS, Octree, RootCube, rank};
 use super::overflow::Overflow;
-use super::packing::{CopcEncoder, PackedNode, Packing};
+use super::packing::{CopcEncoder, HELD_NODES, PackedNode, Packing};
 use crate::geom::lattice::Lattice;
 use crate::io::las::encode::{ComputedFields, LasEncoder};
 use crate::io::las::format::format_of;
@@ -52,6 +52,12 @@ pub fn create(
 pub fn chunk(options: &LasOptions, schema: &Schema) -> Result<ChunkSize> {
     let encoder = encoder(options, schema)?.0;
     Ok(ChunkSize { points: CHUNK_POINTS as usize, bytes: chunk_bytes(&encoder) })
+}
+
+/// Bytes that such a sink holds besides its chunks.
+pub fn arranging_bytes(options: &LasOptions, schema: &Schema) -> Result<u64> {
+    let stride = encoder(options, schema)?.0.packing.stride();
+    Ok(((HELD_PIECES + HELD_NODES) * LEAF_POINTS * stride) as u64)
 }
 
 fn chunk_bytes(encoder: &CopcEncoder) -> u64 {
@@ -151,11 +157,6 @@ impl Sink for CopcSink {
     }
 
     fn arrange(&mut self, extent: &Extent) -> Result<()> {
-        if extent.lattice.z_scale() != 1.0 {
-            let told =
-                "COPC has cubes in the unit of the coordinates, and z has another than x and y";
-            return Err(Error::pipeline(told).help("leave `run.z_scale` out, or write LAZ"));
-        }
         if !extent.bounds.is_empty() {
             let root = RootCube::around(&self.written(extent));
             let overflow = Overflow::at(&self.path.with_extension("nodes"));

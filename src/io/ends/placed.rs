@@ -1,6 +1,6 @@
 //! A sink that is told of every record where it is on the lattice of the run: of the record as the
-//! run has it, before another scale rounds its coordinates. By these positions the records come in
-//! order.
+//! run has it, before another scale rounds its coordinates or it takes the form that it has in a
+//! file of its own. By these positions the records come in order.
 
 use std::sync::{Arc, OnceLock};
 
