@@ -4,6 +4,7 @@ mod boxed;
 mod bulk;
 mod colors;
 mod damage;
+mod damaged_counts;
 mod damaged_rows;
 mod fields;
 mod found;

@@ -103,8 +103,8 @@ pub(crate) struct ReadArguments {
     #[arg(long, value_name = "LENGTH")]
     pub resolution: Option<String>,
     /// What is done about damaged files: fail; skip what is damaged, of LAZ whole chunks; or
-    /// salvage what can be read, also of damaged chunks. Packed PCD and an E57 file that is cut
-    /// off are not mended. What is lost is told [default: fail]
+    /// salvage what can be read, also of damaged chunks. Damaged points of packed PCD and an
+    /// E57 file that is cut off are not mended. What is lost is told [default: fail]
     #[arg(long, value_name = "HOW")]
     pub on_error: Option<String>,
     /// What is taken for granted: crs, that inputs which name no coordinate reference system are in

@@ -15,7 +15,7 @@ use crate::io::systems;
 use crate::point::names::XYZ;
 use crate::point::{Metadata, Scalar, Schema};
 use crate::report::LostPoints;
-use crate::stage::{Input, Part, ReadKeys, Source};
+use crate::stage::{Contradiction, Input, Part, ReadKeys, Source};
 use crate::{Error, Result};
 
 /// What PCD outputs carry on besides points and text.
@@ -238,5 +238,13 @@ impl Source for PcdSource {
 
     fn lost(&self) -> Vec<LostPoints> {
         self.files.iter().flat_map(|file| file.losses.all()).collect()
+    }
+
+    fn contradictions(&self) -> Vec<Contradiction> {
+        let of = |file: &PcdFile| {
+            let at = file.header.points_at;
+            Some(Contradiction::new(&file.path, at, file.belied.clone()?))
+        };
+        self.files.iter().filter_map(of).collect()
     }
 }
