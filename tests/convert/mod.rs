@@ -6,6 +6,7 @@ mod colors;
 mod damage;
 mod damaged_counts;
 mod damaged_rows;
+mod damaged_scans;
 mod fields;
 mod found;
 mod inputs;

@@ -119,7 +119,8 @@ pub struct Read {
     /// before the damage shows, of which the last may be wrong. A file that ends too early has as
     /// many points as it holds; LAS and LAZ whose header counts too few have those behind them as
     /// well, and variable length records that are cut off are left out. Of a text a line that is no
-    /// point is left out, of an E57 file the rest of the scan. PCD whose counts contradict each
+    /// point is left out, of an E57 file the rest of the scan; so are scans of PTX whose first lines
+    /// are wrong, and cells that it counts and does not have. PCD whose counts contradict each
     /// other has as many points as its length holds; without rows and columns, if the counts of
     /// these are what is wrong. Packed points of PCD that are damaged and an E57 file that is cut
     /// off are not mended. What is lost is told, and counted in the report.

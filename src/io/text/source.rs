@@ -4,10 +4,11 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::cells::{PtxText, survey_cells};
 use super::columns::{dimensions, guessed, scalar};
 use super::head::{TextHead, without_mark};
 use super::names::{LONGEST_LINE, RECORDS};
-use super::ptx::{self, PtxScan, PtxText};
+use super::ptx::{self, PtxGrid, PtxScan};
 use super::survey::{CORRECT, TextStretch, TextSurvey, belied, few, no_number, survey};
 use crate::error::shown;
 use crate::io::damage::PartLosses;
@@ -54,7 +55,7 @@ impl TextFile {
     fn open(path: &Path, kind: TextKind, keys: &ReadKeys) -> Result<TextFile> {
         let (file, origin) = Origin::open(path)?;
         let opened = match kind {
-            TextKind::Ptx => Self::ptx(file, path, &origin),
+            TextKind::Ptx => Self::ptx(file, path, &origin, keys.on_error),
             _ => Self::lines(file, path, &origin, kind, keys),
         }?;
         origin.unchanged()?;
@@ -126,8 +127,10 @@ impl TextFile {
         })
     }
 
-    fn ptx(file: File, path: &Path, origin: &Origin) -> Result<TextFile> {
-        let (PtxText { scans, columns }, found) = ptx::survey(file, path, origin.length())?;
+    fn ptx(file: File, path: &Path, origin: &Origin, on_error: OnError) -> Result<TextFile> {
+        let lost = PartLosses::new(on_error);
+        let (text, found) = survey_cells(file, path, origin.length(), lost)?;
+        let PtxText { scans, columns, empty, mut warnings } = text;
         let further: &[&str] = match columns {
             3 => &[],
             4 => &[INTENSITY],
@@ -140,10 +143,9 @@ impl TextFile {
         };
         let names = XYZ.iter().chain(further);
         let columns = names.map(|&name| Some(name.to_owned())).collect();
-        let cells: u64 = scans.iter().map(|scan| scan.columns * scan.rows).sum();
-        let empty = cells - found.points;
+        let cells = empty + found.points;
         let told = format!("{}: {empty} of {cells} cells have no point", shown(path));
-        let warnings = if empty > 0 { vec![told] } else { Vec::new() };
+        warnings.extend((empty > 0).then_some(told));
         let (path, origin) = (path.to_owned(), origin.clone());
         let (separator, belied) = (Delimiter::Blanks, None);
         Ok(TextFile { path, origin, separator, columns, scans, found, belied, warnings })
@@ -259,11 +261,11 @@ impl Source for TextSource {
         let grid = file.scans.get(stretch.scan).map(|&scan| PtxGrid {
             scan,
             number: stretch.scan as u64 + 1,
-            cell: stretch.cells,
+            next: stretch.cells,
         });
         let (left, source) = (stretch.points, number as u32);
-        let (schema, lost) = (&*self.schema, PartLosses::new(file.found.lost.on_error()));
-        Ok(Box::new(TextPart { file, lines, fields, schema, grid, left, source, lost }))
+        let (schema, mends) = (&*self.schema, file.found.lost.mends());
+        Ok(Box::new(TextPart { file, lines, fields, schema, grid, left, source, mends }))
     }
 
     fn warnings(&self) -> Vec<String> {
@@ -282,13 +284,6 @@ impl Source for TextSource {
     }
 }
 
-/// Where a part of PTX is in its scan.
-struct PtxGrid {
-    scan: PtxScan,
-    number: u64,
-    cell: u64,
-}
-
 /// The points of one stretch.
 struct TextPart<'a> {
     file: &'a TextFile,
@@ -299,8 +294,8 @@ struct TextPart<'a> {
     grid: Option<PtxGrid>,
     left: u64,
     source: u32,
-    /// What is wrong is passed over, or not.
-    lost: PartLosses,
+    /// True if what is wrong is passed over: it was found when the file was looked through.
+    mends: bool,
 }
 
 impl Part for TextPart<'_> {
@@ -326,31 +321,42 @@ impl TextPart<'_> {
     /// Reads the next point.
     fn point(&mut self, record: &mut [u8]) -> Result<()> {
         loop {
-            let Some((start, end)) = self.lines.next_whole(&mut self.lost)? else {
+            let next = match self.lines.next_or_error(self.mends) {
+                Err(error) if self.passes(&error) => {
+                    self.grid.iter_mut().for_each(|grid| grid.next += 1);
+                    continue;
+                }
+                next => next?,
+            };
+            let Some((start, end)) = next else {
                 let told = "the file has fewer points than when it was looked through";
                 return Err(Error::data(&self.file.path, told).at_byte(self.lines.length()));
             };
             let at = self.lines.byte(start);
             let line = without_mark(self.lines.text(start, end), at);
-            let Some(grid) = &mut self.grid else {
-                if is_comment(line).is_some() || is_count(line) {
-                    continue;
-                }
-                // What is wrong was found when the file was looked through.
-                match self.numbers(line, at, record) {
-                    Err(error) if self.lost.mends() && error.kind() == ErrorKind::Data => continue,
-                    read => return read,
+            let is_point = match &mut self.grid {
+                None => is_comment(line).is_none() && !is_count(line),
+                Some(grid) => {
+                    grid.next += 1;
+                    !ptx::is_empty(line)
                 }
             };
-            let cell = grid.cell;
-            grid.cell += 1;
-            let mut fields = Fields::new(line, Delimiter::Blanks);
-            let mut next = || fields.next().unwrap_or_default();
-            if !ptx::is_empty([next(), next(), next()]) {
-                self.numbers(line, at, record)?;
-                return self.of_grid(cell, record);
+            if !is_point {
+                continue;
+            }
+            match self.numbers(line, at, record) {
+                Err(error) if self.passes(&error) => {}
+                read => {
+                    read?;
+                    return self.grid.as_ref().map_or(Ok(()), |grid| grid.put(self.schema, record));
+                }
             }
         }
+    }
+
+    /// True for what is wrong and passed over.
+    fn passes(&self, error: &Error) -> bool {
+        self.mends && error.kind() == ErrorKind::Data
     }
 
     /// Reads the numbers of a line that begins at byte `at`.
@@ -374,21 +380,5 @@ impl TextPart<'_> {
                 Err(Error::data(path, told).at_byte(at).help(CORRECT))
             }
         }
-    }
-
-    /// Brings a point of PTX to the coordinates of all scans, and says which cell it is of.
-    fn of_grid(&self, cell: u64, record: &mut [u8]) -> Result<()> {
-        let missing = || Error::internal("a PTX record lacks a dimension");
-        let grid = self.grid.as_ref().ok_or_else(missing)?;
-        let axes = self.schema.coordinates().ok_or_else(missing)?;
-        let own = axes.map(|axis| axis.world(record, Endian::Little));
-        let all = grid.scan.placed(own).map(crate::point::Value::Double);
-        let mut held = axes.iter().zip(all).all(|(axis, v)| axis.put(record, Endian::Little, v));
-        let (row, column) = (cell % grid.scan.rows, cell / grid.scan.rows);
-        for (name, number) in [(ROW, row), (COLUMN, column), (POINT_SOURCE_ID, grid.number)] {
-            let field = self.schema.find(name).ok_or_else(missing)?;
-            held &= field.put(record, Endian::Little, crate::point::Value::Unsigned(number));
-        }
-        if held { Ok(()) } else { Err(Error::internal("a number of PTX does not fit its field")) }
     }
 }
