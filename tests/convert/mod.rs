@@ -14,3 +14,4 @@ mod point_formats;
 mod reshaped;
 mod runs;
 mod units;
+mod unlike;

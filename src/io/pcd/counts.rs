@@ -1,12 +1,12 @@
-//! How many points a PCD file has: as its header says, or, where that cannot be, as its length does.
+//! How many points a PCD file has: as its header says, or, where that cannot be, as its length
+//! does.
 
 use super::file::PcdFile;
 use super::header::{DAMAGED, LONGEST_LINE, PcdData};
-use crate::Error;
-use crate::Result;
 use crate::io::damage::advised;
 use crate::io::rows::lines::Lines;
 use crate::report::Grouped;
+use crate::{Error, Result};
 
 impl PcdFile {
     /// Holds the counts of the header against each other and against the file's length. Those that

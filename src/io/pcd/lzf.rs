@@ -25,8 +25,10 @@ const LONGEST_COPY: usize = 264;
 const WINDOW: usize = 1 << 16;
 
 /// What helps where packed bytes are wrong, and why nothing else does.
-pub(super) const ALL_OR_NONE: &str = "the file is damaged or cut short: copy or make it again; packed PCD has all values of a field \
-     before those of the next, and behind damage none of them is sure, so no point can be saved";
+pub(super) const ALL_OR_NONE: &str = "the file is damaged or cut short: copy or make it again; \
+                                      packed PCD has all values of a field before those of the \
+                                      next, and none is sure behind damage, so no point can be \
+                                      saved";
 
 /// Where unpacking may go on.
 #[derive(Debug, Clone)]

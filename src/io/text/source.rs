@@ -1,5 +1,6 @@
 //! Reads texts as one scan, stretch by stretch.
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -20,6 +21,7 @@ use crate::io::rows::number;
 use crate::io::rows::parts::PartEnds;
 use crate::io::rows::schema::placed;
 use crate::io::systems;
+use crate::io::united::{assumes_dimensions, in_order, unlike};
 use crate::point::names::{BLUE, COLUMN, GREEN, INTENSITY, NIR, POINT_SOURCE_ID, RED, ROW, XYZ};
 use crate::point::{Dimension, Endian, Layout, Metadata, PointBatch, Scalar, Schema};
 use crate::report::LostPoints;
@@ -167,25 +169,31 @@ pub(super) fn open(paths: &[PathBuf], kind: TextKind, keys: &ReadKeys) -> Result
     let Some(first) = files.first() else {
         return Err(Error::pipeline("no text to read"));
     };
-    if let Some(other) = files.iter().find(|file| file.columns != first.columns) {
-        let told = format!("its columns are not those of {}", shown(&first.path));
-        return Err(Error::data(&other.path, told).help("convert one of them first"));
+    if let Some(other) = files.iter().find(|file| file.columns != first.columns)
+        && !assumes_dimensions(keys)
+    {
+        let [own, others] = [other, first].map(|file| file.columns.iter().flatten());
+        return Err(unlike([&*other.path, &first.path], "columns", own, others));
     }
-    let mut facts = first.found.facts.clone();
-    for file in &files[1..] {
-        facts.iter_mut().zip(&file.found.facts).for_each(|(all, one)| all.join(one));
-    }
-    let schema = Arc::new(schema(&first.columns, &facts, kind == TextKind::Ptx));
+    let schema = Arc::new(schema(&files, kind == TextKind::Ptx));
     let ends = PartEnds::of(files.iter().map(|file| file.found.stretches.len()));
     let metadata = systems::said(keys);
     Ok(Box::new(TextSource { schema, metadata, files, ends }))
 }
 
-fn schema(columns: &[Option<String>], facts: &[ColumnFacts], is_ptx: bool) -> Schema {
-    let read = columns.iter().zip(facts);
-    let read =
-        read.filter_map(|(name, facts)| Some((name.clone()?, scalar(name.as_ref()?, facts))));
-    let mut read: Vec<(String, Scalar)> = read.collect();
+/// What holds the points of all files, of each column what holds its numbers in all of them.
+fn schema(files: &[TextFile], is_ptx: bool) -> Schema {
+    let names = |file: &TextFile| file.columns.iter().flatten().cloned().collect();
+    let mut facts: BTreeMap<&String, ColumnFacts> = BTreeMap::new();
+    for file in files {
+        for (name, own) in file.columns.iter().zip(&file.found.facts) {
+            let Some(name) = name else { continue };
+            facts.entry(name).and_modify(|all| all.join(own)).or_insert(*own);
+        }
+    }
+    let of = |name: String| facts.get(&name).map(|facts| (name.clone(), scalar(&name, facts)));
+    let names = in_order(files.iter().map(names).collect());
+    let mut read: Vec<(String, Scalar)> = names.into_iter().filter_map(of).collect();
     // Colours have one depth: a channel whose numbers are all small is of 16 bits if another is.
     let is_color = |name: &str| [RED, GREEN, BLUE, NIR].contains(&name);
     if read.iter().any(|(name, scalar)| is_color(name) && *scalar == Scalar::U16) {
@@ -311,7 +319,10 @@ impl TextPart<'_> {
         batch.clear();
         let points = self.left.min(batch.capacity() as u64) as usize;
         let stride = self.schema.stride;
-        for record in batch.refill(points).chunks_exact_mut(stride) {
+        let records = batch.refill(points);
+        // What the file lacks is 0.
+        records.fill(0);
+        for record in records.chunks_exact_mut(stride) {
             self.point(record)?;
             self.left -= 1;
         }
