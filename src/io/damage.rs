@@ -83,7 +83,7 @@ impl Losses {
 
     /// Points that are lost of those that the parts were to have.
     pub fn while_read(&self) -> u64 {
-        lock(&self.by_part).values().map(|part| part.points).sum()
+        lock(&self.by_part).values().fold(0, |sum, part| sum.saturating_add(part.points))
     }
 
     /// What is told of all that is lost.
@@ -107,11 +107,6 @@ impl PartLosses {
     /// Nothing yet.
     pub fn new(on_error: OnError) -> Self {
         PartLosses { on_error, ..PartLosses::default() }
-    }
-
-    /// What is done about damage.
-    pub fn on_error(&self) -> OnError {
-        self.on_error
     }
 
     /// What is told of it.
@@ -146,16 +141,17 @@ impl PartLosses {
         if points == 0 {
             return Ok(());
         }
-        self.points += points;
+        // What a header claims may be any number.
+        self.points = self.points.saturating_add(points);
         let held = self.list.len();
         match self.list.last_mut() {
             // The same place again.
             Some(last) if last.byte >= byte => {
-                last.points += points;
+                last.points = last.points.saturating_add(points);
                 return Ok(());
             }
             Some(last) if held >= HELD => {
-                last.points += points;
+                last.points = last.points.saturating_add(points);
                 if !last.why.ends_with(BEHIND) {
                     last.why += BEHIND;
                 }
@@ -202,7 +198,7 @@ pub fn told(lost: &[LostPoints], places: u64) -> Vec<String> {
     };
     let mut all: Vec<String> = lost.iter().take(TOLD).map(one).collect();
     if lost.len() > 1 {
-        let points = lost.iter().map(|lost| lost.points).sum();
+        let points = lost.iter().fold(0u64, |sum, lost| sum.saturating_add(lost.points));
         let (points, listed) = (Grouped(points), lost.len() as u64);
         let report = match places > listed {
             true => format!("the report has the first {} one by one", Grouped(listed)),

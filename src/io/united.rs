@@ -1,15 +1,89 @@
-//! Parts of inputs that differ, read as records of one form.
+//! Inputs that differ, read as records of one form: what their records have together, and parts
+//! that are brought to it.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::convert::{Projection, Rounding};
+use super::rows::facts::holding;
+use super::rows::lines;
 use crate::error::shown;
-use crate::point::{Dimension, PointBatch, Schema, Value};
+use crate::point::names::XYZ;
+use crate::point::{Dimension, PointBatch, Scalar, Schema, Value};
 use crate::report::Short;
-use crate::stage::{BATCH, Part};
+use crate::stage::{Assumption, BATCH, Part, ReadKeys};
 use crate::{Error, Result};
+
+/// Names that a message lists at most.
+const NAMED: usize = 8;
+
+/// True if what some inputs lack is taken to be nothing.
+pub fn assumes_dimensions(keys: &ReadKeys) -> bool {
+    keys.assume.contains(&Assumption::Dimensions)
+}
+
+/// The dimensions of all records, each in a type that holds all of its numbers: in the order of all
+/// if they have one, else by name behind the coordinates, so that the order of inputs plays no
+/// part. The error is the number of a schema whose type of this dimension fits none before it.
+pub fn together(
+    own: &[Arc<Schema>],
+) -> std::result::Result<Vec<(String, Scalar)>, (usize, String)> {
+    let lists = own.iter().map(|schema| schema.dimensions.iter().map(|d| d.name.clone()).collect());
+    let order = in_order(lists.collect());
+    let mut fields = Vec::new();
+    for name in order {
+        let mut held = None;
+        for (n, schema) in own.iter().enumerate() {
+            let Some(own) = schema.find(&name) else { continue };
+            held = match held {
+                None => Some(own.scalar),
+                Some(scalar) => Some(holding(scalar, own.scalar).ok_or_else(|| (n, name.clone()))?),
+            };
+        }
+        fields.extend(held.map(|scalar| (name, scalar)));
+    }
+    Ok(fields)
+}
+
+/// The names of all lists, in their order if all are the same, else sorted, coordinates first.
+pub fn in_order(mut lists: Vec<Vec<String>>) -> Vec<String> {
+    if lists.windows(2).all(|pair| pair[0] == pair[1]) {
+        return lists.pop().unwrap_or_default();
+    }
+    let all: BTreeSet<String> = lists.into_iter().flatten().collect();
+    let mut all: Vec<String> = all.into_iter().collect();
+    all.sort_by_key(|name| XYZ.iter().position(|axis| axis == name).unwrap_or(XYZ.len()));
+    all
+}
+
+/// Refuses the file at `path`, whose dimensions, which its format calls `called`, are `own` and not
+/// the `others` of the file at `first`.
+pub fn unlike<'a>(
+    [path, first]: [&Path; 2],
+    called: &str,
+    own: impl IntoIterator<Item = &'a String>,
+    others: impl IntoIterator<Item = &'a String>,
+) -> Error {
+    let [own, others]: [BTreeSet<_>; 2] = [own.into_iter().collect(), others.into_iter().collect()];
+    let list = |what: &str, names: Vec<&&String>| {
+        let listed = names.iter().take(NAMED).map(|name| format!("`{}`", lines::shown(name)));
+        let listed = listed.collect::<Vec<_>>().join(", ");
+        let more = if names.len() > NAMED { " and others" } else { "" };
+        (!names.is_empty()).then(|| format!("{what} {listed}{more}"))
+    };
+    let lacks = list("it lacks", others.difference(&own).collect());
+    let has = list("it alone has", own.difference(&others).collect());
+    let why = match lacks.into_iter().chain(has).collect::<Vec<_>>() {
+        none if none.is_empty() => "their types or their order are others".to_owned(),
+        both => both.join("; "),
+    };
+    Error::data(path, format!("its {called} are not those of {}: {why}", shown(first))).help(
+        "`read.assume = [\"dimensions\"]` reads them as one scan all the same: what a file lacks \
+         is 0 in its points; or convert one of them first",
+    )
+}
 
 /// How the records of one input become those of all.
 #[derive(Debug)]

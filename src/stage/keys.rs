@@ -64,6 +64,8 @@ pub enum Assumption {
     /// their description has, else 0.
     #[serde(rename = "extra-bytes")]
     ExtraBytes,
+    /// The same of dimensions of any kind, in every format whose inputs may differ in them.
+    Dimensions,
 }
 
 /// What is done about damage in an input.

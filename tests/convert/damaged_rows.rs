@@ -11,7 +11,7 @@ use crate::support::records::read;
 
 /// Converts with this `--on-error` to PLY: warnings, records, the points that the report says are
 /// lost with their bytes.
-fn run(at: &Path, scan: &str, how: &str) -> (String, Vec<u8>, Vec<(u64, u64)>) {
+pub(super) fn run(at: &Path, scan: &str, how: &str) -> (String, Vec<u8>, Vec<(u64, u64)>) {
     let mut outputs = Vec::new();
     let mut all = None;
     for threads in ["1", "3"] {

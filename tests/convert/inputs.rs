@@ -219,3 +219,46 @@ fn las_1_5_is_read_and_its_outputs_are_las_1_4_of_the_same_meaning() {
     std::fs::write(at.join("c.las"), &other).unwrap();
     fails(at, &["convert", "c.las", "-o", "o.las"], 1, &["c.las", "header"]);
 }
+
+#[test]
+fn gps_times_of_two_kinds_are_told_apart_and_go_together_without_times() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    let later = "GpsTime,Overlap,ScannerChannel";
+    for (format, timeless, drop) in
+        [("1", "0", "GpsTime"), ("3", "2", "GpsTime"), ("6", "0", later), ("7", "2", later)]
+    {
+        let colors = if timeless == "2" { [",Red,Green,Blue", ",1,2,3"] } else { [""; 2] };
+        for (name, x) in [("week.las", 1), ("standard.las", 2)] {
+            let [head, values] = colors;
+            let csv = format!("X,Y,Z,GpsTime{head}\n{x},2,3,100{values}\n");
+            std::fs::write(at.join("t.csv"), csv).unwrap();
+            let more = ["--scale", "0.01", "--point-format", format, "--quiet"];
+            done(at, &[&["convert", "t.csv", "-o", name], &more[..]].concat());
+        }
+        let mut bytes = std::fs::read(at.join("standard.las")).unwrap();
+        bytes[6] |= 1; // The bit of the global encoding that says of which kind times are.
+        std::fs::write(at.join("standard.las"), bytes).unwrap();
+        let remedy = format!("--point-format {timeless}");
+        let told = [
+            "week.las has GPS week time, seconds since Sunday",
+            "standard.las has adjusted standard GPS time, seconds since 1980 less 1e9",
+            &remedy,
+            &format!("--drop {drop}"),
+        ];
+        fails(at, &["convert", "week.las", "standard.las", "-o", "o.las"], 1, &told);
+        // As it says.
+        for name in ["week", "standard"] {
+            let (from, to) = (format!("{name}.las"), format!("{name}-0.las"));
+            let more = ["--point-format", timeless, "--drop", drop, "--quiet"];
+            done(at, &[&["convert", &from, "-o", &to], &more[..]].concat());
+        }
+        done(at, &["convert", "week-0.las", "standard-0.las", "-o", "o.las", "--quiet"]);
+        let all = text(at, "o.las");
+        let mut lines = all.lines();
+        assert!(!lines.next().unwrap().contains("GpsTime"), "{all}");
+        for begins in ["1.00,2.00,3.00,", "2.00,2.00,3.00,"] {
+            assert!(lines.next().unwrap().starts_with(begins), "{all}");
+        }
+    }
+}

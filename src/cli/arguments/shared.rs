@@ -107,13 +107,13 @@ pub(crate) struct ReadArguments {
     #[arg(long, value_name = "LENGTH")]
     pub resolution: Option<String>,
     /// What is done about damaged files: fail; skip what is damaged, of LAZ whole chunks; or
-    /// salvage what can be read, also of damaged chunks. Packed PCD and an E57 file that is cut
-    /// off are not mended. What is lost is told [default: fail]
+    /// salvage what can be read, also of damaged chunks. Damaged points of packed PCD and an
+    /// E57 file that is cut off are not mended. What is lost is told [default: fail]
     #[arg(long, value_name = "HOW")]
     pub on_error: Option<String>,
     /// What is taken for granted: crs, that inputs which name no coordinate reference system are in
-    /// the one that the others name; extra-bytes, that LAS inputs without extra bytes that others
-    /// have hold nothing there
+    /// the one that the others name; dimensions, that inputs which lack dimensions that others
+    /// have, of LAS extra bytes, hold nothing there; extra-bytes, the same of LAS alone
     #[arg(long, value_name = "WHAT", value_delimiter = ',')]
     pub assume: Vec<String>,
 }

@@ -33,7 +33,7 @@ use crate::stage::{
 ///
 /// What differs is brought to one form where that is asked for: point formats by `point_format`,
 /// scales and offsets by `scale` and `offset` (coordinates that these round are told), systems by
-/// `crs` or `assume`.
+/// `crs` or `assume`, dimensions that some lack by `assume`.
 ///
 /// A number of a PLY text is held in the type that its header says, but coordinates and GPS times
 /// are held as `double` where one of them has more digits than the `float` of its header has room
@@ -135,9 +135,10 @@ pub struct Read {
     #[serde(default, deserialize_with = "some_code", skip_serializing_if = "Option::is_none")]
     pub reproject: Option<String>,
     /// What is taken for granted: `"crs"`, that inputs which name no coordinate reference system
-    /// are in the one that the others name; `"extra-bytes"`, that extra bytes which not all LAS
-    /// inputs have hold nothing in the points of the others: the no-data value of their
-    /// description, else 0.
+    /// are in the one that the others name; `"dimensions"`, that dimensions which not all inputs
+    /// have, of PLY, PCD and texts any and of LAS extra bytes, hold nothing in the points of the
+    /// others: the no-data value that extra bytes may have, else 0; `"extra-bytes"`, the same of
+    /// LAS alone.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub assume: Vec<Assumption>,
     /// What is done about damage: `"fail"`; `"skip"`, which leaves out what is damaged, of LAZ
@@ -145,7 +146,10 @@ pub struct Read {
     /// before the damage shows, of which the last may be wrong. A file that ends too early has as
     /// many points as it holds; LAS and LAZ whose header counts too few have those behind them as
     /// well, and variable length records that are cut off are left out. Of a text a line that is no
-    /// point is left out, of an E57 file the rest of the scan. Packed PCD and an E57 file that is
+    /// point is left out, of an E57 file the rest of the scan; so are scans of PTX whose first
+    /// lines are wrong, and cells that it counts and does not have. PCD whose counts contradict
+    /// each other has as many points as its length holds; without rows and columns, if the counts
+    /// of these are what is wrong. Packed points of PCD that are damaged and an E57 file that is
     /// cut off are not mended. What is lost is told, and counted in the report.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub on_error: Option<OnError>,

@@ -19,6 +19,7 @@ use super::input::{LasInput, extra_len};
 use super::union::described;
 use super::vlr::{Evlr, Vlr};
 use crate::io::steps::whole_steps;
+use crate::io::united::assumes_dimensions;
 use crate::quantity::Setting;
 use crate::stage::{Assumption, OnError, ReadKeys};
 use crate::{Error, Result};
@@ -46,7 +47,9 @@ impl OneForm {
         let assumes_crs = keys.assume.contains(&Assumption::Crs);
         let on_error = keys.on_error;
         let mut form = OneForm { crs, assumes_crs, on_error, ..OneForm::default() };
-        if keys.assume.contains(&Assumption::ExtraBytes) && paths.len() > 1 {
+        let assumes_extra =
+            keys.assume.contains(&Assumption::ExtraBytes) || assumes_dimensions(keys);
+        if assumes_extra && paths.len() > 1 {
             form.extra = extras::of_all(paths, on_error)?;
         }
         let places = keys.scale.is_some() || keys.offset.is_some();

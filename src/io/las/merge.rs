@@ -106,14 +106,31 @@ fn agree(a: &LasInput, b: &LasInput) -> Result<()> {
     if one.scale() != two.scale() {
         return Err(differ(a, b, "scale", one.scale(), two.scale()).help(help(a, b)));
     }
-    if has_gps_time(one.format()) {
-        let kind = |h: &Header| match h.gps_time() {
-            GpsTime::Week => "GPS week time",
-            GpsTime::AdjustedStandard => "adjusted standard GPS time",
-        };
-        same(a, b, "GPS time type", kind(one), kind(two))?;
+    if has_gps_time(one.format()) && one.gps_time() != two.gps_time() {
+        return Err(other_times(a, b));
     }
     Ok(())
+}
+
+fn other_times(a: &LasInput, b: &LasInput) -> Error {
+    let kind = |input: &LasInput| match input.header.gps_time() {
+        GpsTime::Week => "GPS week time, seconds since Sunday",
+        GpsTime::AdjustedStandard => "adjusted standard GPS time, seconds since 1980 less 1e9",
+    };
+    let (one, two) = (shown(&a.path), shown(&b.path));
+    let why = format!("their GPS time type differs: {one} has {}; {two} has {}", kind(a), kind(b));
+    let format = a.header.format();
+    let timeless = if matches!(format, 3 | 5 | 7 | 8 | 10) { 2 } else { 0 };
+    // What formats 6 and above have besides.
+    let drop = match format {
+        ..=5 => "\"GpsTime\"",
+        _ => "\"GpsTime\", \"Overlap\", \"ScannerChannel\"",
+    };
+    refuse(a, b, why).help(format!(
+        "no file says which week it is of, so that neither can be made of the other; without times \
+         they go together: convert each by itself first, with `write.point_format = {timeless}` \
+         and `write.drop = [{drop}]`"
+    ))
 }
 
 fn other_extras(a: &LasInput, b: &LasInput) -> Error {

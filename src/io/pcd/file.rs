@@ -38,6 +38,8 @@ pub(super) struct PcdFile {
     pub marks: Mutex<Option<Arc<Vec<LzfMark>>>>,
     /// What is lost of it.
     pub losses: Losses,
+    /// What its header says of the number of its points, and is not so.
+    pub belied: Option<String>,
 }
 
 impl PcdFile {
@@ -59,6 +61,7 @@ impl PcdFile {
             rounded: AtomicU64::new(0),
             marks: Mutex::new(None),
             losses: Losses::new(on_error),
+            belied: None,
         };
         let names = opened.names();
         let lacks = |axis: &&str| !names.iter().any(|name| name == axis);
@@ -67,7 +70,7 @@ impl PcdFile {
             let told = format!("its points have no field {}", missing.join(", ").to_lowercase());
             return Err(Error::data(path, told));
         }
-        opened.bound()?;
+        opened.count()?;
         opened.empty = (0..opened.parts()).map(|_| AtomicU64::new(0)).collect();
         Ok(opened)
     }
@@ -167,35 +170,6 @@ impl PcdFile {
         }
         let schema = Schema { layout: RECORDS, endian: Endian::Little, stride, dimensions };
         (schema, numbers)
-    }
-
-    /// Refuses a count of points that the file is too short for, or goes on with those that there
-    /// are.
-    fn bound(&mut self) -> Result<()> {
-        let header = &self.header;
-        let room = self.origin.length().saturating_sub(header.body);
-        let numbers = header.fields.iter().map(|field| field.count as u64).sum::<u64>();
-        let holds = match header.data {
-            PcdData::Ascii => (room + 1) / (2 * numbers.max(1)),
-            PcdData::Binary => room / header.stride().max(1) as u64,
-            PcdData::Compressed => return Ok(()),
-        };
-        if header.points <= holds {
-            return Ok(());
-        }
-        let lost = header.points - holds;
-        let told = format!(
-            "the header claims {} points, the file ends after {} at most",
-            Grouped(header.points),
-            Grouped(holds)
-        );
-        let end = self.origin.length();
-        let error = Error::data(&self.path, told)
-            .at_byte(end)
-            .help("the file is cut short, or its header is wrong");
-        self.losses.lose(&self.path, end, lost, error)?;
-        self.header.points = holds;
-        Ok(())
     }
 
     /// What was found while it was read.

@@ -74,7 +74,9 @@ pub(super) struct PcdHeader {
     /// Points of a row, and rows.
     pub width: u64,
     pub height: u64,
+    /// What `POINTS` says, or the product of both where nothing does; and the byte of that entry.
     pub points: u64,
+    pub points_at: u64,
     /// Where the sensor was, and how it was turned (a quaternion, w first).
     pub viewpoint: Option<[f64; 7]>,
     pub data: PcdData,
@@ -90,7 +92,19 @@ impl PcdHeader {
         self.fields.iter().map(PcdField::bytes).sum()
     }
 
-    /// Reads the header of a file of `length` bytes.
+    /// Points of all rows.
+    pub fn cells(&self) -> u64 {
+        self.width.saturating_mul(self.height)
+    }
+
+    /// What is wrong with its counts of points, if they are not the same.
+    pub fn disagrees(&self) -> Option<String> {
+        let PcdHeader { points, width, height, .. } = self;
+        (self.cells() != *points)
+            .then(|| format!("`POINTS {points}` is not `WIDTH {width}` times `HEIGHT {height}`"))
+    }
+
+    /// Reads the header of a file of `length` bytes. Its counts of points may differ.
     ///
     /// # Errors
     ///
@@ -149,7 +163,7 @@ const KEYS: [&str; 11] = [
     "DATA",
 ];
 
-const DAMAGED: &str = "correct the header, or write the file again";
+pub(super) const DAMAGED: &str = "correct the header, or write the file again";
 
 struct HeaderReader<'a> {
     path: &'a Path,
@@ -246,12 +260,8 @@ impl HeaderReader<'_> {
         let Some(width) = width.or(points) else {
             return Err(self.fail("it says neither `WIDTH` nor `POINTS`".to_owned(), body));
         };
-        let grid = width.checked_mul(height);
-        let points = points.or(grid).unwrap_or(u64::MAX);
-        if grid != Some(points) {
-            let told = format!("`POINTS {points}` is not `WIDTH {width}` times `HEIGHT {height}`");
-            return Err(self.fail(told, self.get("POINTS").map_or(0, |(_, at)| at)));
-        }
+        let points = points.unwrap_or(width.saturating_mul(height));
+        let points_at = self.get("POINTS").map_or(0, |(_, at)| at);
         let viewpoint = self.get("VIEWPOINT").and_then(|(value, _)| {
             let numbers: Vec<f64> = value.split_whitespace().flat_map(str::parse).collect();
             numbers.try_into().ok()
@@ -263,6 +273,7 @@ impl HeaderReader<'_> {
             width,
             height,
             points,
+            points_at,
             viewpoint,
             data,
             comments,
@@ -312,6 +323,10 @@ mod tests {
         assert_eq!(read.body as usize, FIRST.len() + rest.len() - 4);
         let old = header("COLUMNS x y z\nSIZE 4 4 4\nWIDTH 5\nDATA ascii\r\n").unwrap();
         assert_eq!((old.points, old.height, old.fields.len()), (5, 1, 3));
+        assert_eq!(old.disagrees(), None);
+        let odd = header(&format!("{FIRST}WIDTH 3\nPOINTS 4\nDATA ascii\n")).unwrap();
+        assert_eq!(odd.disagrees().unwrap(), "`POINTS 4` is not `WIDTH 3` times `HEIGHT 1`");
+        assert_eq!(odd.points_at as usize, FIRST.len() + "WIDTH 3\n".len());
     }
 
     #[test]
@@ -324,7 +339,6 @@ mod tests {
         assert!(with("WIDTH 3\n").contains("no line `DATA`"));
         assert!(with("HUH 3\nDATA ascii\n").contains("`HUH` is no entry"));
         assert!(with("COUNT 1 1\nDATA ascii\n").contains("`COUNT` is of 2 fields, `FIELDS` of 5"));
-        assert!(with("WIDTH 3\nPOINTS 4\nDATA ascii\n").contains("`POINTS 4` is not `WIDTH 3`"));
         assert!(with("DATA ascii\n").contains("neither"));
         assert!(with("WIDTH 3\nDATA zip\n").contains("`DATA zip`"));
         assert!(with("TYPE F F F U Q\nWIDTH 3\nDATA ascii\n").contains("of type Q and size 4"));

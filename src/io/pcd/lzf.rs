@@ -24,6 +24,12 @@ const LONGEST_COPY: usize = 264;
 /// Packed bytes read at once.
 const WINDOW: usize = 1 << 16;
 
+/// What helps where packed bytes are wrong, and why nothing else does.
+pub(super) const ALL_OR_NONE: &str = "the file is damaged or cut short: copy or make it again; \
+                                      packed PCD has all values of a field before those of the \
+                                      next, and none is sure behind damage, so no point can be \
+                                      saved";
+
 /// Where unpacking may go on.
 #[derive(Debug, Clone)]
 pub(super) struct LzfMark {
@@ -81,9 +87,7 @@ impl<'a> Unpacker<'a> {
     }
 
     fn fail(&self, told: &str) -> Error {
-        Error::data(self.path, told)
-            .at_byte(self.from + self.next as u64)
-            .help("the file is damaged or cut short: copy or make it again")
+        Error::data(self.path, told).at_byte(self.from + self.next as u64).help(ALL_OR_NONE)
     }
 
     fn byte(&mut self) -> Result<u8> {
@@ -145,6 +149,11 @@ impl<'a> Unpacker<'a> {
             into = rest;
         }
         Ok(())
+    }
+
+    /// True if nothing is left, unpacked or packed.
+    pub fn is_at_end(&self) -> bool {
+        self.given == self.out.len() && self.from + self.next as u64 == self.end
     }
 
     /// Passes over bytes.

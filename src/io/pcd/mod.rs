@@ -5,6 +5,7 @@
 //! is left out, and said. `rgb` and `rgba` are a number whose bytes are blue, green, red and
 //! opacity.
 
+mod counts;
 mod file;
 mod header;
 mod info;

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::header::PcdHeader;
-use super::lzf::{LzfMark, Unpacker};
+use super::lzf::{ALL_OR_NONE, LzfMark, Unpacker};
 use crate::{Error, Result};
 
 /// Points of a part at least.
@@ -19,37 +19,69 @@ const MARKS: u64 = 8 << 20;
 pub(super) struct Packed {
     /// The packed bytes in the file.
     pub span: [u64; 2],
+    /// How many bytes they are said to be when they are unpacked.
+    pub unpacked: u64,
     /// Points of each part but the last.
     pub part_points: u64,
 }
 
 impl Packed {
-    /// Reads how many bytes are packed, and holds that against header and length.
+    /// Reads how many bytes are packed, and holds that against the file's length.
     pub fn read(file: &File, path: &Path, header: &PcdHeader, length: u64) -> Result<Packed> {
-        let fields = header.fields.len() as u64;
-        let at_once = header.points.saturating_mul(fields * LzfMark::BYTES as u64) / MARKS;
-        let part_points = PART_POINTS.max(at_once);
-        if header.points == 0 {
-            return Ok(Packed { span: [header.body; 2], part_points });
+        if header.points == 0 && header.cells() == 0 {
+            return Ok(Packed { span: [header.body; 2], unpacked: 0, part_points: PART_POINTS });
+        }
+        let from = header.body + 8;
+        let cut = |told: String| Error::data(path, told).at_byte(header.body).help(ALL_OR_NONE);
+        if from > length {
+            return Err(cut("the file ends where its packed points begin".to_owned()));
         }
         let [packed, unpacked] = read_sizes(file, path, header.body)?;
-        let from = header.body + 8;
-        let fail = |told: String| {
-            Error::data(path, told)
-                .at_byte(header.body)
-                .help("the file is cut short, or its header is wrong")
-        };
         if from + packed > length {
-            let there = length.saturating_sub(from);
-            return Err(fail(format!("{packed} bytes are said to be packed, {there} are there")));
+            let there = length - from;
+            return Err(cut(format!("{packed} bytes are said to be packed, {there} are there")));
         }
+        let span = [from, from + packed];
+        Ok(Packed { span, unpacked, part_points: PART_POINTS })
+    }
+
+    /// Cuts it into parts, as the header counts its points.
+    pub fn cut(&mut self, header: &PcdHeader) {
+        let fields = header.fields.len() as u64;
+        let at_once = header.points.saturating_mul(fields * LzfMark::BYTES as u64) / MARKS;
+        self.part_points = PART_POINTS.max(at_once);
+    }
+
+    /// What is wrong with the number of bytes that are packed, if it is not that of the header's
+    /// points.
+    pub fn disagrees(&self, header: &PcdHeader) -> Option<String> {
         let said = header.points.saturating_mul(header.stride() as u64);
-        if unpacked != said {
-            return Err(fail(format!(
-                "{unpacked} bytes are said to be packed, the header's points have {said}"
-            )));
+        let unpacked = self.unpacked;
+        (unpacked != said).then(|| {
+            format!("{unpacked} bytes are said to be packed, the header's points have {said}")
+        })
+    }
+
+    /// How many points are packed, whatever the header says: as many as all bytes that are said to
+    /// be packed make, if these are there.
+    ///
+    /// # Errors
+    ///
+    /// Where bytes are missing or left over: each field begins where the one before it ends, so
+    /// without their number nobody knows where.
+    pub fn holds(&self, file: File, path: &Path, header: &PcdHeader) -> Result<u64> {
+        let (stride, unpacked) = (header.stride() as u64, self.unpacked);
+        let fail = |told: String| Error::data(path, told).at_byte(header.body).help(ALL_OR_NONE);
+        if !unpacked.is_multiple_of(stride) {
+            let told = format!("{unpacked} bytes are said to be packed, a point has {stride}");
+            return Err(fail(told));
         }
-        Ok(Packed { span: [from, from + packed], part_points })
+        let mut unpacker = Unpacker::new(Arc::new(file), path, self.span);
+        unpacker.pass(unpacked)?;
+        match unpacker.is_at_end() {
+            true => Ok(unpacked / stride),
+            false => Err(fail(format!("more than the {unpacked} bytes that it says are packed"))),
+        }
     }
 
     /// Parts of the file.

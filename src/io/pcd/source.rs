@@ -1,21 +1,25 @@
 //! Reads PCD files as one scan.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::file::{PART_POINTS, PcdFile};
-use super::header::{LONGEST_LINE, PcdData, PcdField};
+use super::header::{LONGEST_LINE, PcdData, PcdHeader};
 use super::lzf::Unpacker;
+use super::names::{FORM, RECORDS};
 use super::part::{AsciiPoints, PcdPart, Points};
 use crate::error::shown;
 use crate::io::rows::comments::Said;
 use crate::io::rows::lines::Lines;
 use crate::io::rows::parts::PartEnds;
+use crate::io::rows::schema::{place, placed};
 use crate::io::systems;
-use crate::point::names::XYZ;
-use crate::point::{Metadata, Scalar, Schema};
+use crate::io::united::{ToOneForm, assumes_dimensions, together, unlike};
+use crate::point::names::{GPS_TIME, XYZ};
+use crate::point::{Endian, Metadata, Scalar, Schema};
 use crate::report::LostPoints;
-use crate::stage::{Input, Part, ReadKeys, Source};
+use crate::stage::{Contradiction, Input, Part, ReadKeys, Source};
 use crate::{Error, Result};
 
 /// What PCD outputs carry on besides points and text.
@@ -37,37 +41,67 @@ pub(super) struct PcdNative {
 pub(super) fn open(paths: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn Source>> {
     let files = paths.iter().map(|path| PcdFile::open(path, keys.on_error));
     let files = files.collect::<Result<Vec<_>>>()?;
-    let Some(first) = files.first() else {
+    if files.is_empty() {
         return Err(Error::pipeline("no PCD file to read"));
-    };
-    let wide = needs_double(&files)?;
-    let schema = first.schema(wide).0;
-    if let Some(other) = files.iter().find(|file| file.schema(wide).0 != schema) {
-        let told = format!("its fields are not those of {}", shown(&first.path));
-        return Err(Error::data(&other.path, told).help("convert one of them first"));
     }
+    let wide = needs_double(&files)?;
+    let own: Vec<Arc<Schema>> = files.iter().map(|file| Arc::new(file.schema(wide).0)).collect();
+    let schema = schema_of_all(&files, &own, assumes_dimensions(keys))?;
     let said: Vec<Said> = files.iter().map(|file| Said::of(file.header.comments.clone())).collect();
-    if let Some(n) = said.iter().position(|one| one.gps_time != said[0].gps_time) {
-        let told = format!("its times do not count what those of {} do", shown(&first.path));
+    let is_timed = |n: &usize| own[*n].find(GPS_TIME).is_some();
+    let timed = (0..files.len()).find(is_timed).unwrap_or(0);
+    let is_other = |n: &usize| said[*n].gps_time != said[timed].gps_time;
+    if let Some(n) = (0..files.len()).filter(is_timed).find(is_other) {
+        let told = format!("its times do not count what those of {} do", shown(&files[timed].path));
         return Err(Error::data(&files[n].path, told).help("convert one of them first"));
     }
     let systems: Vec<_> =
         files.iter().zip(&said).map(|(file, said)| (&*file.path, said.crs.clone())).collect();
     let crs = systems::of_all(keys, &systems)?;
-    let metadata = metadata(first, said.into_iter().next().unwrap_or_default(), crs);
+    let form = |(own, file): (&Arc<Schema>, &PcdFile)| {
+        ToOneForm::of((**own).clone(), &schema, &[]).map_err(|error| error.at(&file.path))
+    };
+    let forms = own.iter().zip(&files).map(form).collect::<Result<Vec<_>>>()?;
+    let gps_time = said[timed].gps_time;
+    let metadata = metadata(&files, said.into_iter().next().unwrap_or_default(), crs);
+    let metadata = Metadata { gps_time, ..metadata };
     let ends = PartEnds::of(files.iter().map(PcdFile::parts));
-    Ok(Box::new(PcdSource { schema: Arc::new(schema), metadata, files, ends, wide }))
+    Ok(Box::new(PcdSource { schema, own, forms, metadata, files, ends, wide }))
 }
 
-fn metadata(file: &PcdFile, said: Said, crs: Option<String>) -> Metadata {
-    let fields = file.header.fields.iter();
-    let names = file.names().into_iter().zip(fields.flat_map(|f| std::iter::repeat_n(f, f.count)));
-    let of_one = |(dimension, field): (String, &PcdField)| {
-        (field.count == 1).then(|| (dimension, field.name.clone()))
+/// What holds the points of all files; refuses those that have other fields, unless what some lack
+/// `is_nothing`.
+fn schema_of_all(files: &[PcdFile], own: &[Arc<Schema>], is_nothing: bool) -> Result<Arc<Schema>> {
+    let Some(odd) = own.iter().position(|schema| *schema != own[0]) else {
+        return Ok(own[0].clone());
     };
-    let viewpoint = file.header.viewpoint;
-    let native =
-        PcdNative { names: names.filter_map(of_one).collect(), data: file.header.data, viewpoint };
+    if !is_nothing {
+        let names = |n: usize| own[n].dimensions.iter().map(|dimension| &dimension.name);
+        let paths = [&*files[odd].path, &files[0].path];
+        return Err(unlike(paths, "fields", names(odd), names(0)));
+    }
+    let fields = together(own).map_err(|(n, name)| {
+        let first = shown(&files[0].path);
+        let told = format!("no type holds all numbers of `{name}` here and in {first}");
+        Error::data(&files[n].path, told).help("convert one of them first")
+    })?;
+    let (dimensions, stride) = placed(fields);
+    let mut schema = Schema { layout: RECORDS, endian: Endian::Little, stride, dimensions };
+    place(&mut schema, &FORM);
+    Ok(Arc::new(schema))
+}
+
+fn metadata(files: &[PcdFile], said: Said, crs: Option<String>) -> Metadata {
+    let mut names: BTreeMap<String, String> = BTreeMap::new();
+    for file in files {
+        let fields = file.header.fields.iter().flat_map(|f| std::iter::repeat_n(f, f.count));
+        for (dimension, field) in file.names().into_iter().zip(fields).filter(|(_, f)| f.count == 1)
+        {
+            names.entry(dimension).or_insert_with(|| field.name.clone());
+        }
+    }
+    let PcdHeader { data, viewpoint, .. } = files[0].header;
+    let native = PcdNative { names: names.into_iter().collect(), data, viewpoint };
     Metadata {
         units: crs.as_deref().map(crate::io::wkt::units).unwrap_or_default(),
         crs,
@@ -113,6 +147,9 @@ fn ascii(file: &PcdFile, wide: bool) -> Result<AsciiPoints<'_>> {
 /// The points of one or several PCD files.
 struct PcdSource {
     schema: Arc<Schema>,
+    /// What the records of each file are, and how they become those of all where they are others.
+    own: Vec<Arc<Schema>>,
+    forms: Vec<Option<ToOneForm>>,
     metadata: Metadata,
     files: Vec<PcdFile>,
     ends: PartEnds,
@@ -158,7 +195,8 @@ impl Source for PcdSource {
         let Some(file) = self.files.get(input) else {
             return Err(Error::internal(format!("input {input} of {}", self.files.len())));
         };
-        Ok(metadata(file, Said::of(file.header.comments.clone()), self.metadata.crs.clone()))
+        let files = std::slice::from_ref(file);
+        Ok(metadata(files, Said::of(file.header.comments.clone()), self.metadata.crs.clone()))
     }
 
     fn points(&self) -> u64 {
@@ -176,7 +214,9 @@ impl Source for PcdSource {
             _ if file.is_grid() => PART_POINTS * self.schema.stride as u64,
             _ => 0,
         };
-        self.files.iter().map(of_file).max().unwrap_or(0)
+        let formed = |form: &Option<ToOneForm>| form.as_ref().map_or(0, ToOneForm::part_bytes);
+        let all = self.files.iter().zip(&self.forms);
+        all.map(|(file, form)| of_file(file) + formed(form)).max().unwrap_or(0)
     }
 
     fn parts(&self) -> usize {
@@ -201,7 +241,8 @@ impl Source for PcdSource {
         };
         let (cell, left) = self.points_at(file, within)?;
         let grid = if file.is_grid() { 8 } else { 0 };
-        let own = self.schema.stride - grid;
+        let schema = &*self.own[number];
+        let own = schema.stride - grid;
         let points = match (&file.packed, file.header.data) {
             (Some(packed), _) => {
                 let (marks, handle) = (file.marks()?, Arc::new(file.origin.reopen()?));
@@ -214,10 +255,9 @@ impl Source for PcdSource {
             _ => Points::Binary(file.origin.reopen()?, file.header.body + cell * own as u64),
         };
         let (source, buffer) = (number as u32, Vec::new());
-        let schema = &*self.schema;
         let empty = (&file.empty[within], 0);
         let losses = (within, file.losses.part());
-        Ok(Box::new(PcdPart {
+        let part = Box::new(PcdPart {
             file,
             points,
             schema,
@@ -228,7 +268,11 @@ impl Source for PcdSource {
             empty,
             losses,
             buffer,
-        }))
+        });
+        Ok(match &self.forms[number] {
+            Some(form) => form.part(part, &file.path),
+            None => part,
+        })
     }
 
     fn warnings(&self) -> Vec<String> {
@@ -238,5 +282,13 @@ impl Source for PcdSource {
 
     fn lost(&self) -> Vec<LostPoints> {
         self.files.iter().flat_map(|file| file.losses.all()).collect()
+    }
+
+    fn contradictions(&self) -> Vec<Contradiction> {
+        let of = |file: &PcdFile| {
+            let at = file.header.points_at;
+            Some(Contradiction::new(&file.path, at, file.belied.clone()?))
+        };
+        self.files.iter().filter_map(of).collect()
     }
 }

@@ -1,7 +1,7 @@
 //! What the vertices of several PLY files have in common, and the one form that they are brought to
 //! where encodings, the order of properties or their types differ.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::ascii::AsciiPart;
@@ -11,8 +11,8 @@ use super::names::{self, RECORDS};
 use crate::error::shown;
 use crate::io::rows::Encoding;
 use crate::io::rows::comments::{self, Said};
-use crate::io::rows::facts::holding;
 use crate::io::rows::schema::placed;
+use crate::io::united::{together, unlike};
 use crate::point::names::{GPS_TIME, XYZ};
 use crate::point::{Endian, GpsTime, Scalar, Schema};
 use crate::{Error, Result};
@@ -40,6 +40,11 @@ impl Texts {
         let comments = others.into_iter().filter(|comment| !is_ours(comment)).collect();
         Texts { crs, gps_time, dimensions, comments }
     }
+
+    /// True if vertices have GPS times.
+    pub fn has_times(&self) -> bool {
+        self.dimensions.iter().any(|name| name == GPS_TIME)
+    }
 }
 
 /// What records are: those of all files, and those of each.
@@ -48,73 +53,61 @@ pub(super) struct Agreed {
     pub own: Vec<Arc<Schema>>,
 }
 
-/// Finds what holds the vertices of all files; refuses those that have other properties, or numbers
-/// that no type holds together.
-pub(super) fn agreed(files: &[PlyFile], texts: &[Texts]) -> Result<Agreed> {
-    let first = &files[0];
-    for (file, text) in files.iter().zip(texts).skip(1) {
-        agree((first, &texts[0]), (file, text))?;
-    }
+/// Finds what holds the vertices of all files; refuses those that have other properties, unless
+/// what some lack `is_nothing`, or numbers that no type holds together.
+pub(super) fn agreed(files: &[PlyFile], texts: &[Texts], is_nothing: bool) -> Result<Agreed> {
+    agree(files, texts, is_nothing)?;
     let wide = needs_double(files, texts)?;
     let of = |(file, text): (&PlyFile, &Texts)| Arc::new(schema(file, &text.dimensions, wide));
     let own: Vec<Arc<Schema>> = files.iter().zip(texts).map(of).collect();
     if own.iter().all(|schema| *schema == own[0]) {
         return Ok(Agreed { schema: own[0].clone(), own });
     }
-    Ok(Agreed { schema: Arc::new(united(files, &own)?), own })
-}
-
-/// The dimensions of all, which have the same names, each in a type that holds all of its numbers;
-/// in the order of all if they have one, else by name.
-fn united(files: &[PlyFile], own: &[Arc<Schema>]) -> Result<Schema> {
-    let names = |schema: &Schema| -> Vec<String> {
+    let names = |schema: &Schema| -> BTreeSet<String> {
         schema.dimensions.iter().map(|dimension| dimension.name.clone()).collect()
     };
-    let mut order = names(&own[0]);
-    if own.iter().any(|schema| names(schema) != order) {
-        order.sort_by_key(|name| {
-            (XYZ.iter().position(|axis| axis == name).unwrap_or(3), name.clone())
-        });
+    let odd = own.iter().position(|schema| names(schema) != names(&own[0]));
+    if let Some(odd) = odd.filter(|_| !is_nothing) {
+        return Err(disagree(&files[0], &files[odd], "vertex properties are"));
     }
-    let mut fields = Vec::new();
-    for name in order {
-        let mut scalar = None;
-        for (schema, file) in own.iter().zip(files) {
-            let Some(dimension) = schema.find(&name) else {
-                return Err(disagree(&files[0], file, "vertex properties are"));
-            };
-            let both = scalar.map_or(Some(dimension.scalar), |one| holding(one, dimension.scalar));
-            if both.is_none() {
-                let told = format!("no type holds all numbers of `{name}`: its type is");
-                return Err(disagree(&files[0], file, &told));
-            }
-            scalar = both;
-        }
-        fields.extend(scalar.map(|scalar| (name, scalar)));
-    }
+    let fields = together(&own).map_err(|(n, name)| {
+        let told = format!("no type holds all numbers of `{name}`: its type is");
+        disagree(&files[0], &files[n], &told)
+    })?;
     let (dimensions, stride) = placed(fields);
-    Ok(Schema { layout: RECORDS, endian: Endian::Little, stride, dimensions })
+    let schema = Schema { layout: RECORDS, endian: Endian::Little, stride, dimensions };
+    Ok(Agreed { schema: Arc::new(schema), own })
 }
 
-/// Refuses two files whose vertices have other properties.
-fn agree((first, texts): (&PlyFile, &Texts), (other, of_other): (&PlyFile, &Texts)) -> Result<()> {
-    let names = |file: &PlyFile, texts: &Texts| -> BTreeSet<(String, String)> {
-        let properties = file.properties().iter().map(|p| p.name.clone());
-        properties.zip(texts.dimensions.clone()).collect()
-    };
-    let properties = |file: &PlyFile| -> BTreeSet<String> {
-        file.properties().iter().map(|p| p.name.clone()).collect()
-    };
-    let differ = if properties(first) != properties(other) {
-        "vertex properties are"
-    } else if texts.gps_time != of_other.gps_time {
-        "GPS time type is"
-    } else if names(first, texts) != names(other, of_other) {
-        "dimension names are"
-    } else {
-        return Ok(());
-    };
-    Err(disagree(first, other, differ))
+/// Refuses files whose vertices have other properties than the first, unless what some lack
+/// `is_nothing`; and those that mean something else by them than one before.
+fn agree(files: &[PlyFile], texts: &[Texts], is_nothing: bool) -> Result<()> {
+    let mut known: BTreeMap<&str, (&str, &PlyFile)> = BTreeMap::new();
+    let mut timed: Option<(&PlyFile, &Texts)> = None;
+    for (n, (file, text)) in files.iter().zip(texts).enumerate() {
+        let properties = || file.properties().iter().map(|property| &property.name);
+        let all = || properties().map(String::as_str);
+        let of_first = || files[0].properties().iter().map(|property| &property.name);
+        if !is_nothing && n > 0 && all().collect::<BTreeSet<_>>() != known.keys().copied().collect()
+        {
+            let paths = [&*file.path, &files[0].path];
+            return Err(unlike(paths, "vertex properties", properties(), of_first()));
+        }
+        // A file without times says nothing of theirs.
+        if text.has_times() || !is_nothing {
+            let (first, of_first) = timed.get_or_insert((file, text));
+            if of_first.gps_time != text.gps_time {
+                return Err(disagree(first, file, "GPS time type is"));
+            }
+        }
+        for (property, name) in all().zip(&text.dimensions) {
+            let (dimension, first) = known.entry(property).or_insert((name, file));
+            if dimension != name {
+                return Err(disagree(first, file, "dimension names are"));
+            }
+        }
+    }
+    Ok(())
 }
 
 fn disagree(first: &PlyFile, other: &PlyFile, what: &str) -> Error {

@@ -1,5 +1,6 @@
 //! Reads the vertices of PLY files.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -13,7 +14,7 @@ use crate::io::rows::Encoding;
 use crate::io::rows::lines::shown;
 use crate::io::rows::parts::PartEnds;
 use crate::io::systems;
-use crate::io::united::ToOneForm;
+use crate::io::united::{ToOneForm, assumes_dimensions};
 use crate::point::{Metadata, Schema};
 use crate::report::LostPoints;
 use crate::stage::{Contradiction, Input, Part, ReadKeys, Source};
@@ -47,7 +48,7 @@ pub(super) struct Rest {
 
 /// Opens PLY files that agree in vertex properties and coordinate reference system: their headers,
 /// and what stands before the vertices. Where encodings, the order of properties or their types
-/// differ, records are brought to one form.
+/// differ, or where it is assumed that what some lack is nothing, records are brought to one form.
 ///
 /// # Errors
 ///
@@ -83,7 +84,7 @@ impl PlySource {
             return Err(Error::pipeline("no PLY file to read"));
         };
         let texts: Vec<Texts> = files.iter().map(Texts::of).collect();
-        let Agreed { schema, own } = agreed(&files, &texts)?;
+        let Agreed { schema, own } = agreed(&files, &texts, assumes_dimensions(keys))?;
         if schema.coordinates().is_none() {
             return Err(Error::data(&first.path, "a comment gives x, y or z another dimension"));
         }
@@ -154,22 +155,30 @@ fn metadata(files: &[PlyFile], texts: Vec<Texts>, crs: Option<String>) -> Metada
     let first = &files[0];
     let encoding = first.header.encoding;
     let is_one = files.iter().all(|file| file.header.encoding == encoding);
-    let properties = first
-        .properties()
+    // Of two names for one dimension the first in their order: that of the inputs plays no part.
+    let mut properties = BTreeMap::new();
+    for (property, dimension) in files
         .iter()
-        .zip(&texts[0].dimensions)
-        .map(|(property, dimension)| (dimension.clone(), property.name.clone()))
-        .collect();
+        .zip(&texts)
+        .flat_map(|(file, texts)| file.properties().iter().zip(&texts.dimensions))
+    {
+        let known = properties.entry(dimension.clone()).or_insert_with(|| property.name.clone());
+        if property.name < *known {
+            known.clone_from(&property.name);
+        }
+    }
+    let timed = texts.iter().find(|texts| texts.has_times()).unwrap_or(&texts[0]);
+    let gps_time = timed.gps_time;
     let native = PlyNative {
         encoding: if is_one { encoding } else { Encoding::BinaryLittleEndian },
-        properties,
+        properties: properties.into_iter().collect(),
         obj_info: union(files.iter().map(|f| f.header.obj_info.clone()).collect()),
         rest: rest(files),
     };
     Metadata {
         units: crs.as_deref().map(crate::io::wkt::units).unwrap_or_default(),
         crs,
-        gps_time: texts[0].gps_time,
+        gps_time,
         comments: union(texts.into_iter().map(|t| t.comments).collect()),
         native: Some(Arc::new(native)),
         ..Metadata::default()

@@ -52,7 +52,7 @@ pub(crate) fn placed(
 }
 
 /// Gives each field of a row its place: one behind the other, but for colours that share a number.
-pub(super) fn place(row: &mut Schema, form: &RowForm) {
+pub(crate) fn place(row: &mut Schema, form: &RowForm) {
     let is_packed = form.packs_colors && packs(&row.dimensions);
     let mut packed = None;
     row.stride = 0;

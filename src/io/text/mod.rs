@@ -5,6 +5,7 @@
 //! looked through once (`survey.rs`): how many points it has, which types hold its numbers, and
 //! where its lines begin that threads may share out.
 
+mod cells;
 mod columns;
 mod head;
 mod info;

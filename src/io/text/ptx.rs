@@ -3,17 +3,17 @@
 //! These say how many columns and rows the grid has, where the scanner stood, and a matrix that
 //! brings the points of this scan, as row vectors with a 1, to the coordinates that all scans
 //! share. Cells follow column by column; one of which no light came back is `0 0 0`, and is no
-//! point.
+//! point. What is in the cells of a file `cells` finds.
 
 use std::fs::File;
 use std::path::Path;
 
 use super::names::LONGEST_LINE;
-use super::survey::{Surveyor, TextSurvey};
 use crate::io::rows::fields::{Delimiter, Fields};
 use crate::io::rows::lines::Lines;
 use crate::io::rows::number;
-use crate::point::Scalar;
+use crate::point::names::{COLUMN, POINT_SOURCE_ID, ROW};
+use crate::point::{Endian, Scalar, Schema, Value};
 use crate::stage::foreign;
 use crate::{Error, Result};
 
@@ -23,8 +23,8 @@ pub(super) const FAMILY: &str = "PTX";
 /// What messages call a PTX file.
 pub(super) const CALLED: &str = "a PTX file";
 
-/// Scans of one file that are told apart.
-const SCANS_MOST: usize = u16::MAX as usize;
+/// Lines of a scan before its cells.
+pub(super) const HEAD_LINES: u64 = 10;
 
 /// First bytes that tell whether a file is PTX.
 const FIRST: u64 = 512;
@@ -40,6 +40,9 @@ pub(super) struct PtxScan {
 }
 
 impl PtxScan {
+    /// In the place of a scan whose first lines are wrong: no cell of it is read.
+    pub const UNREAD: PtxScan = PtxScan { columns: 0, rows: 0, pose: [[0.0; 4]; 4] };
+
     /// Where a point of the scan is in the coordinates of all.
     pub fn placed(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         let [a, b, c, d] = self.pose;
@@ -47,10 +50,39 @@ impl PtxScan {
     }
 }
 
-/// True for the coordinates of a cell that has no point.
-pub(super) fn is_empty(coordinates: [&[u8]; 3]) -> bool {
+/// Where a part of PTX is in its scan.
+pub(super) struct PtxGrid {
+    pub scan: PtxScan,
+    pub number: u64,
+    /// The cell of the next line.
+    pub next: u64,
+}
+
+impl PtxGrid {
+    /// Brings the point of the last line to the coordinates of all scans, and says which cell it is
+    /// of.
+    pub fn put(&self, schema: &Schema, record: &mut [u8]) -> Result<()> {
+        let missing = || Error::internal("a PTX record lacks a dimension");
+        let axes = schema.coordinates().ok_or_else(missing)?;
+        let own = axes.map(|axis| axis.world(record, Endian::Little));
+        let all = self.scan.placed(own).map(Value::Double);
+        let mut held = axes.iter().zip(all).all(|(axis, v)| axis.put(record, Endian::Little, v));
+        let (cell, rows) = (self.next.saturating_sub(1), self.scan.rows.max(1));
+        for (name, number) in
+            [(ROW, cell % rows), (COLUMN, cell / rows), (POINT_SOURCE_ID, self.number)]
+        {
+            let field = schema.find(name).ok_or_else(missing)?;
+            held &= field.put(record, Endian::Little, Value::Unsigned(number));
+        }
+        if held { Ok(()) } else { Err(Error::internal("a number of PTX does not fit its field")) }
+    }
+}
+
+/// True for the line of a cell that has no point.
+pub(super) fn is_empty(line: &[u8]) -> bool {
     let is_zero = |field: &[u8]| field.iter().all(|b| b"0.+-".contains(b)) && field.contains(&b'0');
-    coordinates.into_iter().all(is_zero)
+    let mut fields = Fields::new(line, Delimiter::Blanks);
+    (0..3).all(|_| fields.next().is_some_and(is_zero))
 }
 
 /// True if a file that begins so is PTX: two lines of one whole number and four of three numbers.
@@ -61,21 +93,15 @@ pub(super) fn sniff(first: &[u8]) -> bool {
     counts.into_iter().all(|count| numbers().flatten() == Some(count))
 }
 
-/// What a PTX file holds.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct PtxText {
-    pub scans: Vec<PtxScan>,
-    /// Numbers on a line.
-    pub columns: usize,
-}
-
-struct PtxReader<'a> {
-    path: &'a Path,
-    lines: Lines<'a>,
+/// Reads the first lines of scans.
+pub(super) struct PtxReader<'a> {
+    pub path: &'a Path,
+    pub lines: Lines<'a>,
 }
 
 impl PtxReader<'_> {
-    fn fail(&self, told: String, at: u64) -> Error {
+    /// An error at a byte.
+    pub fn fail(&self, told: String, at: u64) -> Error {
         Error::data(self.path, told).at_byte(at).help(
             "each scan of PTX has two lines of counts, four of three numbers, four of four, and \
              then a line for each cell",
@@ -105,8 +131,8 @@ impl PtxReader<'_> {
         }
     }
 
-    /// The ten lines of the next scan; None at the end of the file.
-    fn scan(&mut self) -> Result<Option<PtxScan>> {
+    /// The first lines of the next scan; None at the end of the file.
+    pub fn scan(&mut self) -> Result<Option<PtxScan>> {
         let at = self.lines.at();
         let Some([columns]) = self.numbers()? else { return Ok(None) };
         let ended = |reader: &Self| {
@@ -138,7 +164,7 @@ impl PtxReader<'_> {
 }
 
 /// Opens a file that begins as PTX does.
-fn begin<'a>(file: File, path: &'a Path, length: u64) -> Result<PtxReader<'a>> {
+pub(super) fn begin<'a>(file: File, path: &'a Path, length: u64) -> Result<PtxReader<'a>> {
     let mut first = vec![0; length.min(FIRST) as usize];
     let failed = |e| Error::io(path, "read its first lines", e);
     std::os::unix::fs::FileExt::read_exact_at(&file, &mut first, 0).map_err(failed)?;
@@ -155,97 +181,4 @@ pub(super) fn first_cell(file: File, path: &Path, length: u64) -> Result<(usize,
     let Some((start, end)) = reader.lines.next()? else { return Ok((4, length)) };
     let columns = Delimiter::Blanks.numbers(reader.lines.text(start, end));
     Ok((columns.unwrap_or(4), reader.lines.byte(start)))
-}
-
-/// Looks through a PTX file.
-///
-/// # Errors
-///
-/// The first line that is not what it should be, and a file that ends before its cells do.
-pub(super) fn survey(file: File, path: &Path, length: u64) -> Result<(PtxText, TextSurvey)> {
-    let mut reader = begin(file, path, length)?;
-    let mut scans: Vec<PtxScan> = Vec::new();
-    let mut surveyor: Option<Surveyor<'_>> = None;
-    loop {
-        let Some(scan) = reader.scan()? else { break };
-        if scans.len() == SCANS_MOST {
-            let told = format!("it has more than {SCANS_MOST} scans");
-            return Err(reader.fail(told, reader.lines.at()));
-        }
-        for cell in 0..scan.columns * scan.rows {
-            let Some((start, end)) = reader.lines.next()? else {
-                let (n, cells) = (scans.len() + 1, scan.columns * scan.rows);
-                let told = format!("the file ends after {cell} of {cells} cells of scan {n}");
-                return Err(Error::data(path, told)
-                    .at_byte(length)
-                    .help("the file is cut short, or the counts before its cells are wrong"));
-            };
-            let (text, at, line) =
-                (reader.lines.text(start, end), reader.lines.byte(start), reader.lines.number());
-            let surveyor = surveyor.get_or_insert_with(|| {
-                let columns = Delimiter::Blanks.numbers(text).unwrap_or(3).max(3);
-                let looks = (0..columns).map(|n| n >= 3).collect();
-                Surveyor::new(path, Delimiter::Blanks, looks)
-            });
-            surveyor.begin(at, line - 1, scans.len(), cell, cell == 0);
-            let mut fields = Fields::new(text, Delimiter::Blanks);
-            let mut next = || fields.next().unwrap_or_default();
-            match is_empty([next(), next(), next()]) {
-                true => surveyor.pass(text, line, at)?,
-                false => surveyor.add(text, line, at)?,
-            }
-        }
-        if let Some(surveyor) = &mut surveyor {
-            surveyor.end(reader.lines.at());
-        }
-        scans.push(scan);
-    }
-    let Some(surveyor) = surveyor else {
-        let none = Surveyor::new(path, Delimiter::Blanks, vec![false, false, false, true]);
-        return Ok((PtxText { scans, columns: 4 }, none.finish(length, None)));
-    };
-    let survey = surveyor.finish(length, None);
-    Ok((PtxText { scans, columns: survey.facts.len() }, survey))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const HEAD: &str = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
-
-    fn surveyed(text: &str) -> Result<(PtxText, TextSurvey)> {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.ptx");
-        std::fs::write(&path, text).unwrap();
-        survey(File::open(&path).unwrap(), &path, text.len() as u64)
-    }
-
-    #[test]
-    fn scans_have_their_grids_and_poses_and_empty_cells_are_no_points() {
-        let turned = "0 1 0 0\n-1 0 0 0\n0 0 1 0\n10 20 30 1\n";
-        let cells = "1 2 3 0.5\n0.000 -0 0 0.5\n";
-        let text = format!("1\n2\n{HEAD}{turned}{cells}2\n1\n{HEAD}{turned}{cells}");
-        assert!(sniff(text.as_bytes()));
-        let (ptx, survey) = surveyed(&text).unwrap();
-        assert_eq!((ptx.columns, ptx.scans.len(), survey.points), (4, 2, 2));
-        assert_eq!((ptx.scans[1].columns, ptx.scans[1].rows), (2, 1));
-        assert_eq!(ptx.scans[0].placed([1.0, 2.0, 3.0]), [8.0, 21.0, 33.0]);
-        assert_eq!(survey.stretches.len(), 2);
-        assert_eq!((survey.stretches[1].first, survey.stretches[1].points), (1, 1));
-        assert_eq!(&text[survey.stretches[1].span[0] as usize..][..9], "1 2 3 0.5");
-    }
-
-    #[test]
-    fn what_is_wrong_is_told_with_its_place() {
-        let pose = "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
-        let told = |text: &str| surveyed(text).unwrap_err().to_string();
-        let cut = format!("2\n2\n{HEAD}{pose}1 2 3 0.5\n");
-        assert!(told(&cut).contains("after 1 of 4 cells of scan 1"));
-        let more = format!("1\n1\n{HEAD}{pose}1 2 3 0.5\n1 2 3 0.5\n");
-        assert!(told(&more).contains("line 12 has more than 1 numbers"));
-        assert!(told("1 2 3\n").contains("by its first bytes"));
-        let odd = format!("1\n1\n{HEAD}{}1 2 3 0.5\n", pose.replace("0 0 1 0", "0 0 1 7"));
-        assert!(told(&odd).contains("the matrix of a scan"));
-    }
 }

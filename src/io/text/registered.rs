@@ -95,7 +95,7 @@ impl Format for TextFormat {
 
     fn read_keys(&self) -> &'static [&'static str] {
         match self.habit.kind {
-            TextKind::Ptx => &[],
+            TextKind::Ptx => &["on_error"],
             _ => &["columns", "on_error"],
         }
     }

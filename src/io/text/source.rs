@@ -1,13 +1,15 @@
 //! Reads texts as one scan, stretch by stretch.
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::cells::{PtxText, survey_cells};
 use super::columns::{dimensions, guessed, scalar};
 use super::head::{TextHead, without_mark};
 use super::names::{LONGEST_LINE, RECORDS};
-use super::ptx::{self, PtxScan, PtxText};
+use super::ptx::{self, PtxGrid, PtxScan};
 use super::survey::{CORRECT, TextStretch, TextSurvey, belied, few, no_number, survey};
 use crate::error::shown;
 use crate::io::damage::PartLosses;
@@ -19,6 +21,7 @@ use crate::io::rows::number;
 use crate::io::rows::parts::PartEnds;
 use crate::io::rows::schema::placed;
 use crate::io::systems;
+use crate::io::united::{assumes_dimensions, in_order, unlike};
 use crate::point::names::{BLUE, COLUMN, GREEN, INTENSITY, NIR, POINT_SOURCE_ID, RED, ROW, XYZ};
 use crate::point::{Dimension, Endian, Layout, Metadata, PointBatch, Scalar, Schema};
 use crate::report::LostPoints;
@@ -54,7 +57,7 @@ impl TextFile {
     fn open(path: &Path, kind: TextKind, keys: &ReadKeys) -> Result<TextFile> {
         let (file, origin) = Origin::open(path)?;
         let opened = match kind {
-            TextKind::Ptx => Self::ptx(file, path, &origin),
+            TextKind::Ptx => Self::ptx(file, path, &origin, keys.on_error),
             _ => Self::lines(file, path, &origin, kind, keys),
         }?;
         origin.unchanged()?;
@@ -126,8 +129,10 @@ impl TextFile {
         })
     }
 
-    fn ptx(file: File, path: &Path, origin: &Origin) -> Result<TextFile> {
-        let (PtxText { scans, columns }, found) = ptx::survey(file, path, origin.length())?;
+    fn ptx(file: File, path: &Path, origin: &Origin, on_error: OnError) -> Result<TextFile> {
+        let lost = PartLosses::new(on_error);
+        let (text, found) = survey_cells(file, path, origin.length(), lost)?;
+        let PtxText { scans, columns, empty, mut warnings } = text;
         let further: &[&str] = match columns {
             3 => &[],
             4 => &[INTENSITY],
@@ -140,10 +145,9 @@ impl TextFile {
         };
         let names = XYZ.iter().chain(further);
         let columns = names.map(|&name| Some(name.to_owned())).collect();
-        let cells: u64 = scans.iter().map(|scan| scan.columns * scan.rows).sum();
-        let empty = cells - found.points;
+        let cells = empty + found.points;
         let told = format!("{}: {empty} of {cells} cells have no point", shown(path));
-        let warnings = if empty > 0 { vec![told] } else { Vec::new() };
+        warnings.extend((empty > 0).then_some(told));
         let (path, origin) = (path.to_owned(), origin.clone());
         let (separator, belied) = (Delimiter::Blanks, None);
         Ok(TextFile { path, origin, separator, columns, scans, found, belied, warnings })
@@ -165,25 +169,31 @@ pub(super) fn open(paths: &[PathBuf], kind: TextKind, keys: &ReadKeys) -> Result
     let Some(first) = files.first() else {
         return Err(Error::pipeline("no text to read"));
     };
-    if let Some(other) = files.iter().find(|file| file.columns != first.columns) {
-        let told = format!("its columns are not those of {}", shown(&first.path));
-        return Err(Error::data(&other.path, told).help("convert one of them first"));
+    if let Some(other) = files.iter().find(|file| file.columns != first.columns)
+        && !assumes_dimensions(keys)
+    {
+        let [own, others] = [other, first].map(|file| file.columns.iter().flatten());
+        return Err(unlike([&*other.path, &first.path], "columns", own, others));
     }
-    let mut facts = first.found.facts.clone();
-    for file in &files[1..] {
-        facts.iter_mut().zip(&file.found.facts).for_each(|(all, one)| all.join(one));
-    }
-    let schema = Arc::new(schema(&first.columns, &facts, kind == TextKind::Ptx));
+    let schema = Arc::new(schema(&files, kind == TextKind::Ptx));
     let ends = PartEnds::of(files.iter().map(|file| file.found.stretches.len()));
     let metadata = systems::said(keys);
     Ok(Box::new(TextSource { schema, metadata, files, ends }))
 }
 
-fn schema(columns: &[Option<String>], facts: &[ColumnFacts], is_ptx: bool) -> Schema {
-    let read = columns.iter().zip(facts);
-    let read =
-        read.filter_map(|(name, facts)| Some((name.clone()?, scalar(name.as_ref()?, facts))));
-    let mut read: Vec<(String, Scalar)> = read.collect();
+/// What holds the points of all files, of each column what holds its numbers in all of them.
+fn schema(files: &[TextFile], is_ptx: bool) -> Schema {
+    let names = |file: &TextFile| file.columns.iter().flatten().cloned().collect();
+    let mut facts: BTreeMap<&String, ColumnFacts> = BTreeMap::new();
+    for file in files {
+        for (name, own) in file.columns.iter().zip(&file.found.facts) {
+            let Some(name) = name else { continue };
+            facts.entry(name).and_modify(|all| all.join(own)).or_insert(*own);
+        }
+    }
+    let of = |name: String| facts.get(&name).map(|facts| (name.clone(), scalar(&name, facts)));
+    let names = in_order(files.iter().map(names).collect());
+    let mut read: Vec<(String, Scalar)> = names.into_iter().filter_map(of).collect();
     // Colours have one depth: a channel whose numbers are all small is of 16 bits if another is.
     let is_color = |name: &str| [RED, GREEN, BLUE, NIR].contains(&name);
     if read.iter().any(|(name, scalar)| is_color(name) && *scalar == Scalar::U16) {
@@ -259,11 +269,11 @@ impl Source for TextSource {
         let grid = file.scans.get(stretch.scan).map(|&scan| PtxGrid {
             scan,
             number: stretch.scan as u64 + 1,
-            cell: stretch.cells,
+            next: stretch.cells,
         });
         let (left, source) = (stretch.points, number as u32);
-        let (schema, lost) = (&*self.schema, PartLosses::new(file.found.lost.on_error()));
-        Ok(Box::new(TextPart { file, lines, fields, schema, grid, left, source, lost }))
+        let (schema, mends) = (&*self.schema, file.found.lost.mends());
+        Ok(Box::new(TextPart { file, lines, fields, schema, grid, left, source, mends }))
     }
 
     fn warnings(&self) -> Vec<String> {
@@ -282,13 +292,6 @@ impl Source for TextSource {
     }
 }
 
-/// Where a part of PTX is in its scan.
-struct PtxGrid {
-    scan: PtxScan,
-    number: u64,
-    cell: u64,
-}
-
 /// The points of one stretch.
 struct TextPart<'a> {
     file: &'a TextFile,
@@ -299,8 +302,8 @@ struct TextPart<'a> {
     grid: Option<PtxGrid>,
     left: u64,
     source: u32,
-    /// What is wrong is passed over, or not.
-    lost: PartLosses,
+    /// True if what is wrong is passed over: it was found when the file was looked through.
+    mends: bool,
 }
 
 impl Part for TextPart<'_> {
@@ -316,7 +319,10 @@ impl TextPart<'_> {
         batch.clear();
         let points = self.left.min(batch.capacity() as u64) as usize;
         let stride = self.schema.stride;
-        for record in batch.refill(points).chunks_exact_mut(stride) {
+        let records = batch.refill(points);
+        // What the file lacks is 0.
+        records.fill(0);
+        for record in records.chunks_exact_mut(stride) {
             self.point(record)?;
             self.left -= 1;
         }
@@ -326,31 +332,42 @@ impl TextPart<'_> {
     /// Reads the next point.
     fn point(&mut self, record: &mut [u8]) -> Result<()> {
         loop {
-            let Some((start, end)) = self.lines.next_whole(&mut self.lost)? else {
+            let next = match self.lines.next_or_error(self.mends) {
+                Err(error) if self.passes(&error) => {
+                    self.grid.iter_mut().for_each(|grid| grid.next += 1);
+                    continue;
+                }
+                next => next?,
+            };
+            let Some((start, end)) = next else {
                 let told = "the file has fewer points than when it was looked through";
                 return Err(Error::data(&self.file.path, told).at_byte(self.lines.length()));
             };
             let at = self.lines.byte(start);
             let line = without_mark(self.lines.text(start, end), at);
-            let Some(grid) = &mut self.grid else {
-                if is_comment(line).is_some() || is_count(line) {
-                    continue;
-                }
-                // What is wrong was found when the file was looked through.
-                match self.numbers(line, at, record) {
-                    Err(error) if self.lost.mends() && error.kind() == ErrorKind::Data => continue,
-                    read => return read,
+            let is_point = match &mut self.grid {
+                None => is_comment(line).is_none() && !is_count(line),
+                Some(grid) => {
+                    grid.next += 1;
+                    !ptx::is_empty(line)
                 }
             };
-            let cell = grid.cell;
-            grid.cell += 1;
-            let mut fields = Fields::new(line, Delimiter::Blanks);
-            let mut next = || fields.next().unwrap_or_default();
-            if !ptx::is_empty([next(), next(), next()]) {
-                self.numbers(line, at, record)?;
-                return self.of_grid(cell, record);
+            if !is_point {
+                continue;
+            }
+            match self.numbers(line, at, record) {
+                Err(error) if self.passes(&error) => {}
+                read => {
+                    read?;
+                    return self.grid.as_ref().map_or(Ok(()), |grid| grid.put(self.schema, record));
+                }
             }
         }
+    }
+
+    /// True for what is wrong and passed over.
+    fn passes(&self, error: &Error) -> bool {
+        self.mends && error.kind() == ErrorKind::Data
     }
 
     /// Reads the numbers of a line that begins at byte `at`.
@@ -374,21 +391,5 @@ impl TextPart<'_> {
                 Err(Error::data(path, told).at_byte(at).help(CORRECT))
             }
         }
-    }
-
-    /// Brings a point of PTX to the coordinates of all scans, and says which cell it is of.
-    fn of_grid(&self, cell: u64, record: &mut [u8]) -> Result<()> {
-        let missing = || Error::internal("a PTX record lacks a dimension");
-        let grid = self.grid.as_ref().ok_or_else(missing)?;
-        let axes = self.schema.coordinates().ok_or_else(missing)?;
-        let own = axes.map(|axis| axis.world(record, Endian::Little));
-        let all = grid.scan.placed(own).map(crate::point::Value::Double);
-        let mut held = axes.iter().zip(all).all(|(axis, v)| axis.put(record, Endian::Little, v));
-        let (row, column) = (cell % grid.scan.rows, cell / grid.scan.rows);
-        for (name, number) in [(ROW, row), (COLUMN, column), (POINT_SOURCE_ID, grid.number)] {
-            let field = self.schema.find(name).ok_or_else(missing)?;
-            held &= field.put(record, Endian::Little, crate::point::Value::Unsigned(number));
-        }
-        if held { Ok(()) } else { Err(Error::internal("a number of PTX does not fit its field")) }
     }
 }

@@ -48,6 +48,8 @@ pub(super) struct Surveyor<'a> {
     path: &'a Path,
     separator: Delimiter,
     facts: Vec<ColumnFacts>,
+    /// What these were before the last line that was added as a whole.
+    before: Vec<ColumnFacts>,
     /// Columns of which the numbers are looked at; the others are only counted.
     looks: Vec<bool>,
     stretches: Vec<TextStretch>,
@@ -57,7 +59,23 @@ pub(super) struct Surveyor<'a> {
 impl<'a> Surveyor<'a> {
     pub fn new(path: &'a Path, separator: Delimiter, looks: Vec<bool>) -> Self {
         let facts = vec![ColumnFacts::NONE; looks.len()];
-        Surveyor { path, separator, facts, looks, stretches: Vec::new(), points: 0 }
+        let (before, stretches) = (Vec::new(), Vec::new());
+        Surveyor { path, separator, facts, before, looks, stretches, points: 0 }
+    }
+
+    /// Numbers of a line.
+    pub fn columns(&self) -> usize {
+        self.looks.len()
+    }
+
+    /// As [`add`](Self::add), but a line that is wrong says nothing of the columns.
+    pub fn add_whole(&mut self, text: &[u8], line: u64, at: u64) -> Result<()> {
+        self.before.clone_from(&self.facts);
+        let added = self.add(text, line, at);
+        if added.is_err() {
+            self.facts.clone_from(&self.before);
+        }
+        added
     }
 
     /// Adds the line `text`, number `line`, which begins at byte `at`.
@@ -103,11 +121,9 @@ impl<'a> Surveyor<'a> {
         }
     }
 
-    /// As [`add`](Self::add), for a line that is no point.
-    pub fn pass(&mut self, text: &[u8], line: u64, at: u64) -> Result<()> {
-        self.add(text, line, at)?;
-        self.points -= 1;
-        Ok(())
+    /// Says that the line that was added last is no point.
+    pub fn take_back(&mut self) {
+        self.points = self.points.saturating_sub(1);
     }
 
     pub fn finish(mut self, end: u64, claimed: Option<u64>) -> TextSurvey {
@@ -173,7 +189,6 @@ pub(super) fn survey(
     let mut lines = Lines::new(file, path, [head.body, length], head.lines, LONGEST_LINE);
     let mut surveyor = Surveyor::new(path, head.separator, looks);
     let mut claimed: Option<u64> = None;
-    let mut before = Vec::new();
     while let Some((start, end)) = lines.next_whole(&mut lost)? {
         let (text, at) = (lines.text(start, end), lines.byte(start));
         let text = super::head::without_mark(text, at);
@@ -186,13 +201,12 @@ pub(super) fn survey(
             continue;
         }
         surveyor.begin(at, lines.number() - 1, 0, 0, false);
-        // A line that is passed over says nothing of the columns.
-        if lost.mends() {
-            before.clone_from(&surveyor.facts);
-        }
-        if let Err(error) = surveyor.add(text, lines.number(), at) {
+        let added = match lost.mends() {
+            true => surveyor.add_whole(text, lines.number(), at),
+            false => surveyor.add(text, lines.number(), at),
+        };
+        if let Err(error) = added {
             lost.lose(path, at, 1, error)?;
-            surveyor.facts.clone_from(&before);
         }
     }
     Ok(TextSurvey { lost, ..surveyor.finish(length, claimed) })
