@@ -95,7 +95,7 @@ pub(crate) struct ReadArguments {
     #[arg(long, value_name = "CRS")]
     pub crs: Option<String>,
     /// Coordinate reference system that points are brought to, by its EPSG code, such as
-    /// EPSG:25832; heights stay as they are, or change their unit: EPSG:25832+7837 [default: theirs]
+    /// EPSG:25832; heights stay, or change their unit: EPSG:25832+7837 [default: theirs]
     #[arg(long, value_name = "EPSG")]
     pub reproject: Option<String>,
     /// Where points of LAS, LAZ and COPC are read, in their coordinates; of COPC only that is read:

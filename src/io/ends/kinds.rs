@@ -47,20 +47,21 @@ use crate::stage::{
 /// and all that a pipeline does happens there; `box` and `resolution` speak of the inputs still.
 /// Systems and the operations between their datums are those of EPSG. Of the operations that are
 /// meant for all of the place where the scan is, the most accurate that needs no file of a grid is
-/// taken. A warning names it with its accuracy, and a better one that needs such a file, where there
-/// is one; `run.reprojection` of a report has them, too. Systems between which there is none without
-/// a file are refused, and none are ever treated as one because they are alike. Between systems on
-/// one datum nothing is lost, and nothing is told.
+/// taken. A warning names it with its accuracy, and a better one that needs such a file, where
+/// there is one; `run.reprojection` of a report has them, too. Systems between which there is none
+/// without a file are refused, and none are ever treated as one because they are alike. Between
+/// systems on one datum nothing is lost, and nothing is told.
 ///
-/// Heights stay as they are where the system that is asked for names none, and the output still says
-/// whose they are. `"EPSG:25832+7837"` changes their unit, or depths to heights; heights of another
-/// datum would take a grid and are refused. Heights above the ellipsoid (`"EPSG:4979"`, and the
-/// three axes of `"EPSG:4978"`) change with the place.
+/// Heights stay as they are where the system that is asked for names none, and the output still
+/// says whose they are. `"EPSG:25832+7837"` changes their unit, or depths to heights; heights of
+/// another datum would take a grid and are refused. Heights above the ellipsoid (`"EPSG:4979"`, and
+/// the three axes of `"EPSG:4978"`) change with the place.
 ///
-/// Steps of coordinates become those of the largest power of ten that is no longer on the ground, or
-/// of `scale` and `offset`, which are those of the new coordinates then; other coordinates become
-/// `f64`. Normals are not turned, which is told. Sines and the like are those of the machine: their
-/// last bit may differ from one kind of machine to another, and in rare cases a step with it.
+/// Steps of coordinates become those of the largest power of ten that is no longer on the ground,
+/// or of `scale` and `offset`, which are those of the new coordinates then; other coordinates
+/// become `f64`. Normals are not turned, which is told. Sines and the like are those of the
+/// machine: their last bit may differ from one kind of machine to another, and in rare cases a step
+/// with it.
 ///
 /// # Formats
 ///
