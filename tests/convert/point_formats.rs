@@ -135,3 +135,27 @@ fn the_header_is_one_of_a_version_that_has_the_point_format() {
         assert!(alike(name, &now[name], values), "{name}");
     });
 }
+
+#[test]
+fn auto_is_the_smallest_point_format_that_holds_what_is_left() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    std::fs::write(at.join("base.csv"), BASE).unwrap();
+    let las = ["convert", "base.csv", "-o", "3.las", "--scale", "0.001", "--quiet"];
+    done(at, &las);
+    for (drop, format) in
+        [("gpstime", 2), ("Red,Green,Blue", 1), ("GpsTime,Red,Green,Blue", 0), ("quality", 3)]
+    {
+        let run = ["convert", "3.las", "-o", "o.las", "--point-format", "auto", "--drop", drop];
+        done(at, &[&run[..], &["--quiet"]].concat());
+        let told = done(at, &["info", "o.las"]);
+        let found = told.lines().find(|line| line.contains("point_format")).unwrap();
+        assert!(found.ends_with(&format!(" {format}")), "{drop}: {found}");
+        let (own, left) = (columns(at, "3.las"), columns(at, "o.las"));
+        let dropped = drop.to_lowercase();
+        for (name, column) in &own {
+            let is_dropped = dropped.split(',').any(|drop| drop == name.to_lowercase());
+            assert_eq!(left.get(name), Some(column).filter(|_| !is_dropped), "{drop}: {name}");
+        }
+    }
+}

@@ -12,6 +12,7 @@ use super::settled::settled;
 use crate::error::shown;
 #[cfg(feature = "proj")]
 use crate::io::reproject::{self, AskedSteps};
+use crate::io::rows::names::meant;
 use crate::io::sniff;
 use crate::point::names::GPS_TIME;
 use crate::point::{Metadata, PointBatch, Schema};
@@ -192,8 +193,8 @@ impl CreateSink for OutputFile {
         if metadata.crs.is_some() && !self.format.holds_crs() {
             lost.push("the coordinate reference system".to_owned());
         }
-        let has_times =
-            schema.find(GPS_TIME).is_some() && !self.keys.drop.contains(&GPS_TIME.into());
+        let is_dropped = self.keys.drop.iter().any(|name| meant(name, schema) == GPS_TIME);
+        let has_times = schema.find(GPS_TIME).is_some() && !is_dropped;
         if has_times && metadata.gps_time.is_some() && !self.format.holds_gps_time_kind() {
             lost.push("what GPS times count".to_owned());
         }

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use super::copc;
 use super::format::{FAMILY, format_of};
 use super::header::{CALLED, SIGNATURE};
+use super::holding::las_schema;
 use super::native::lost;
 use super::noted;
 use super::own::{Shifted, own_form};
@@ -226,7 +227,10 @@ impl LasFormat {
         let asked = keys.given_point_format();
         let format = match self.form {
             Form::Octree => Some(copc::point_format(asked, schema, &keys.drop)?),
-            _ => asked,
+            _ => match asked {
+                None if keys.point_format.is_some() => smallest(keys, schema)?,
+                asked => asked,
+            },
         };
         Ok(format.filter(|format| Some(*format) != format_of(schema)))
     }
@@ -245,4 +249,13 @@ impl LasFormat {
         let reforms = !matches!(self.format(keys, schema), Ok(None));
         keys.given_scale().is_some() || keys.given_offset().is_some() || reforms || reshapes(keys)
     }
+}
+
+/// The smallest point format that holds what `drop` leaves of records of LAS; None where it leaves
+/// all, and for others, whose format is the smallest in any case.
+fn smallest(keys: &WriteKeys, schema: &Schema) -> Result<Option<u8>> {
+    if keys.drop.is_empty() || schema.layout.family != FAMILY {
+        return Ok(None);
+    }
+    las_schema(schema, &keys.drop).map(|(format, _)| Some(format))
 }
