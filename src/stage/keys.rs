@@ -20,6 +20,8 @@ pub struct ReadKeys {
     /// The coordinate reference system of all inputs, whatever they say: WKT, or `EPSG:code` with a
     /// vertical code behind `+`.
     pub crs: Option<String>,
+    /// The system that points are brought to, as EPSG codes; no matter of formats.
+    pub reproject: Option<String>,
     /// What is taken for granted of inputs that do not say it.
     pub assume: Vec<Assumption>,
     /// What is done about damage.

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::keys::ReadKeys;
 use crate::point::{Metadata, PointBatch, Schema};
 use crate::report::{LostPoints, Reprojection};
 use crate::{Error, Result};
@@ -24,6 +25,11 @@ pub trait OpenSource: Send + Sync {
 
     /// The family of formats of its files, if it is nothing but these files.
     fn family(&self) -> Option<&str> {
+        None
+    }
+
+    /// How its files are read, if it is nothing but these files.
+    fn keys(&self) -> Option<&ReadKeys> {
         None
     }
 

@@ -97,10 +97,13 @@ fn degrees_have_steps_that_are_no_longer_on_the_ground() {
     assert_eq!(scale, json!([1e-10, 1e-10, 0.01]));
     // The place was rounded to hundredths of a metre before.
     near(&first, &DEGREES, 1e-7);
-    // Too fine for the offset: before the run, as far as headers tell, or with the point.
     let far = ["in.las", "-o", "c.las", "--reproject", "EPSG:4258", "--scale", "1e-10,1e-10,0.01"];
     let far = [&["convert"], &far[..], &["--offset", "0,0,0"]].concat();
-    fails(at, &far, 2, &["too far from the offset", "--scale", "--offset"]);
+    fails(at, &far, 1, &["in.las", "too far from the offset", "--scale", "--offset"]);
+    // A step of a map is none of degrees.
+    let run = ["in.las", "-o", "d.las", "--reproject", "EPSG:4258", "--scale", "0.001"];
+    let (code, _, told) = pointmill(at, &[&["convert"], &run[..]].concat());
+    assert!(code == 0 && told.contains("steps of 0.001, which are 111 m on the ground"), "{told}");
 }
 
 #[test]
@@ -144,11 +147,35 @@ fn heights_change_their_unit_and_nothing_else() {
     done(at, &run("EPSG:2277+6360", "EPSG:26914+5703"));
     let wanted = [616_567.191_618_491, 3_348_982.452_381_561, 304.800_609_601_219];
     near(&rows(at, "out.csv")[0], &wanted, 1e-5);
-    let unit = ["unit z is in", "EPSG:2277+6360"];
+    let unit = ["the unit of heights is not named", "EPSG:2277+6360"];
     fails(at, &run("EPSG:2277", "EPSG:26914"), 2, &unit);
     fails(at, &run("EPSG:2277+6360", "EPSG:26914+3855"), 2, &["a grid", "keeps those"]);
     fails(at, &run("EPSG:2277+6360", "EPSG:4979"), 2, &["a grid"]);
     fails(at, &run("EPSG:26914", "EPSG:26914+5703"), 2, &["do not say which heights"]);
+    // Nothing would say that heights are metres still.
+    fails(at, &run("EPSG:26914", "EPSG:2277"), 2, &["the unit of heights is not named"]);
+}
+
+#[test]
+fn heights_of_las_have_steps_of_their_own() {
+    let at = folder([-98.0, 30.5, 1000.25]);
+    let at = at.path();
+    let las = |from: &str, to: &str| {
+        let make = ["in.xyz", "-o", "in.las", "--scale", "1e-7,1e-7,0.01", "--crs", from];
+        done(at, &[&["convert"], &make[..], &["--quiet"]].concat());
+        done(at, &["convert", "in.las", "-o", "out.las", "--reproject", to, "--quiet"]);
+        (info(at, "out.las")["scale"].clone(), rows(at, "out.las").remove(0))
+    };
+    let (scale, first) = las("EPSG:4269+6360", "EPSG:26914+5703");
+    assert_eq!(scale, json!([0.01, 0.01, 0.001]));
+    near(&first[2..3], &[1000.25 * 1200.0 / 3937.0], 5.01e-4);
+    let (scale, first) = las("EPSG:4269+6360", "EPSG:26914");
+    assert_eq!((scale, first[2]), (json!([0.01, 0.01, 0.01]), 1000.25));
+    assert!(is_in(at, "out.las", &[26914, 6360]));
+    let (scale, first) = las("EPSG:4979", "EPSG:4978");
+    assert_eq!(scale, json!([0.01, 0.01, 0.01]));
+    let far = first[..3].iter().map(|v| v * v).sum::<f64>().sqrt();
+    assert!((6_370_000.0..6_380_000.0).contains(&far), "{first:?}");
 }
 
 #[test]
@@ -170,7 +197,7 @@ fn what_is_not_known_is_refused() {
     assert!(!at.join("out.xyz").exists());
     // A point that is nowhere in the system of the inputs.
     std::fs::write(at.join("in.xyz"), "9 50 1\n9 50.1 1\n9 95 1\n").unwrap();
-    fails(at, &from("EPSG:4326", "EPSG:3857"), 2, &["in.xyz", "the point at 9, 95, 1"]);
+    fails(at, &from("EPSG:4326", "EPSG:3857"), 1, &["in.xyz", "the point at 9, 95, 1"]);
 }
 
 #[test]
@@ -201,4 +228,81 @@ fn a_scan_without_points_is_one_in_the_other_system() {
     let run = ["none.csv", "-o", "none.ply", "--crs", "EPSG:31467", "--reproject", "EPSG:25832"];
     done(at, &[&["convert"], &run[..], &["--quiet"]].concat());
     assert!(head(at, "none.ply").contains("EPSG:25832"));
+}
+
+#[test]
+fn several_inputs_are_one_whatever_their_scales_and_their_order() {
+    let at = folder(HERE);
+    let at = at.path();
+    let las = |out: &str, scale: &str, offset: &str| {
+        let make = ["convert", "in.xyz", "-o", out, "--scale", scale, "--offset", offset];
+        done(at, &[&make[..], &["--crs", "EPSG:25832", "--quiet"]].concat());
+    };
+    las("a.las", "0.001", "690000,5335000,0");
+    las("b.las", "0.01", "691000.005,5335000,100");
+    let run = |first: &str, second: &str| {
+        let run = ["convert", first, second, "-o", "ab.laz", "--reproject", "EPSG:31468"];
+        let (code, _, told) = pointmill(at, &[&run[..], &["--no-provenance"]].concat());
+        assert!(code == 0 && told.contains("by `DHDN to ETRS89"), "{told}");
+        let mut points = rows(at, "ab.laz");
+        points.sort_by(|a, b| a.partial_cmp(b).unwrap());
+        (info(at, "ab.laz")["scale"].clone(), points)
+    };
+    let both = run("a.las", "b.las");
+    assert_eq!(both.0, json!([0.001, 0.001, 0.001]));
+    assert_eq!((both.1.len(), &both), (200, &run("b.las", "a.las")));
+    // Two stages that read in one way are one, others are refused.
+    let merged = |second: &str| {
+        let text = format!(
+            "[[stage]]\nkind = 'read'\nname = 'a'\npath = 'a.las'\nreproject = 'EPSG:31468'\n\
+             [[stage]]\nkind = 'read'\nname = 'b'\npath = 'b.las'\n{second}\n\
+             [[stage]]\nkind = 'merge'\nfrom = ['a', 'b']\n\
+             [[stage]]\nkind = 'write'\npath = 'm.laz'\n"
+        );
+        std::fs::write(at.join("m.toml"), text).unwrap();
+    };
+    merged("reproject = 'EPSG:31468'");
+    done(at, &["run", "m.toml", "--quiet"]);
+    assert_eq!(rows(at, "m.laz").len(), 200);
+    merged("");
+    fails(at, &["run", "m.toml"], 2, &["read in one way", "the same keys"]);
+}
+
+#[test]
+fn a_box_that_is_wrong_misleads_nobody() {
+    let at = folder(HERE);
+    let at = at.path();
+    let las = ["in.xyz", "-o", "in.las", "--scale", "0.001", "--offset", "690000,5335000,0"];
+    done(at, &[&["convert"], &las[..], &["--crs", "EPSG:25832", "--quiet"]].concat());
+    let mut bytes = std::fs::read(at.join("in.las")).unwrap();
+    // The largest and the smallest x, y and z (LAS 1.4 R15, section 2.4).
+    bytes[179..227].fill(0);
+    std::fs::write(at.join("odd.las"), bytes).unwrap();
+    for (scan, out) in [("in.las", "a.las"), ("odd.las", "b.las")] {
+        let run = ["convert", scan, "-o", out, "--reproject", "EPSG:31468", "--no-provenance"];
+        done(at, &[&run[..], &["--headers", "warn", "--quiet"]].concat());
+    }
+    assert_eq!(rows(at, "a.las"), rows(at, "b.las"));
+    assert_eq!(info(at, "b.las")["scale"], json!([0.001, 0.001, 0.001]));
+}
+
+#[test]
+fn a_reduction_and_copc_are_made_in_the_other_system() {
+    let at = folder(HERE);
+    let at = at.path();
+    let las = ["in.xyz", "-o", "in.las", "--scale", "0.001", "--offset", "690000,5335000,0"];
+    done(at, &[&["convert"], &las[..], &["--crs", "EPSG:25832", "--quiet"]].concat());
+    let run = ["convert", "in.las", "-o", "o.copc.laz", "--reproject", "EPSG:25833", "--quiet"];
+    done(at, &run);
+    done(at, &["validate", "o.copc.laz"]);
+    assert!(is_in(at, "o.copc.laz", &[25833]));
+    let run = ["reduce", "in.las", "-o", "r.laz", "--keep", "50%", "--reproject", "EPSG:25833"];
+    done(at, &[&run[..], &["--quiet"]].concat());
+    assert_eq!(rows(at, "r.laz").len(), 50);
+    near(&rows(at, "r.laz")[0], &ZONE_33, 110.0);
+    done(at, &["reproduce", "r.laz", "--quiet"]);
+    // A box is in the coordinates of the inputs.
+    let run = ["in.las", "-o", "b.las", "--reproject", "EPSG:25833", "--quiet", "--box"];
+    done(at, &[&["convert"], &run[..], &["691000,5335000,691010,5336000"]].concat());
+    assert_eq!(rows(at, "b.las").len(), 10);
 }

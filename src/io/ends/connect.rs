@@ -34,15 +34,13 @@ pub struct InputFiles {
     pub keys: ReadKeys,
     /// All formats, for what a file is that is none of these.
     pub formats: Formats,
-    /// The system that points are brought to, where that is asked for.
-    pub reproject: Option<String>,
 }
 
 impl OpenSource for InputFiles {
     fn open(&self) -> Result<Box<dyn Source>> {
         let told = |error| sniff::told(error, &*self.format, &self.formats);
         let opened = |keys: &ReadKeys| self.format.open(&self.files, keys).map_err(told);
-        match &self.reproject {
+        match &self.keys.reproject {
             None => opened(&self.keys),
             Some(to) => reprojected(to, &self.keys, opened),
         }
@@ -56,10 +54,21 @@ impl OpenSource for InputFiles {
         Some(self.format.family())
     }
 
+    fn keys(&self) -> Option<&ReadKeys> {
+        Some(&self.keys)
+    }
+
     fn merged(&self, other: &dyn OpenSource) -> Result<Box<dyn OpenSource>> {
         if other.family() != self.family() {
             let told = "sources are merged where all read files, and of one family of formats";
             return Err(Error::pipeline(told).help("convert some of them first"));
+        }
+        if other.keys() != Some(&self.keys) {
+            let told = "sources that are merged are read in one way, and the keys of these differ";
+            return Err(Error::pipeline(told).help(
+                "give both `read` the same keys; where that does not do, convert each by itself, \
+                 and merge what comes of it",
+            ));
         }
         let (mut files, more) = (self.files.clone(), other.paths());
         let real = |file: &PathBuf| file.canonicalize().unwrap_or_else(|_| file.clone());
@@ -69,13 +78,13 @@ impl OpenSource for InputFiles {
         }
         files.extend(more);
         let (format, formats) = (self.format.clone(), self.formats.clone());
-        let (keys, reproject) = (self.keys.clone(), self.reproject.clone());
-        Ok(Box::new(InputFiles { files, format, keys, formats, reproject }))
+        let keys = self.keys.clone();
+        Ok(Box::new(InputFiles { files, format, keys, formats }))
     }
 }
 
 /// What `open` opens, in the system `to`. Scale and offset are those of the points there: inputs
-/// that differ in them are read as one by the finest.
+/// that differ in them are read as one by steps that round nothing.
 #[cfg(feature = "proj")]
 fn reprojected(
     to: &str,
@@ -83,8 +92,7 @@ fn reprojected(
     open: impl Fn(&ReadKeys) -> Result<Box<dyn Source>>,
 ) -> Result<Box<dyn Source>> {
     let asked = AskedSteps { scale: keys.scale, offset: keys.offset };
-    let auto = |key: Option<Setting<[f64; 3]>>| key.map(|_| Setting::Auto);
-    let (scale, offset) = (auto(keys.scale), auto(keys.offset));
+    let (scale, offset) = (Some(Setting::Auto), Some(Setting::Auto));
     reproject::reprojected(open(&ReadKeys { scale, offset, ..keys.clone() })?, to, asked)
 }
 

@@ -57,6 +57,7 @@ impl Read {
         let scans = self.scans.as_ref();
         keys.scans = scans.map(|scans| scans.iter().map(|number| number.get()).collect());
         keys.crs.clone_from(&self.crs);
+        keys.reproject.clone_from(&self.reproject);
         keys.assume.clone_from(&self.assume);
         keys.on_error = self.on_error.unwrap_or_default();
         keys.bounds.clone_from(&self.bounds);

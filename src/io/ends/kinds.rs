@@ -50,18 +50,25 @@ use crate::stage::{
 /// taken. A warning names it with its accuracy, and a better one that needs such a file, where
 /// there is one; `run.reprojection` of a report has them, too. Systems between which there is none
 /// without a file are refused, and none are ever treated as one because they are alike. Between
-/// systems on one datum nothing is lost, and nothing is told.
+/// systems on one datum nothing is lost, and nothing is told. Files that are converted one by one
+/// may have an operation each, where they lie in places of several; files that are read as one scan
+/// have one.
+///
+/// Where the scan is, headers say; where they do not, or the first points of some parts are
+/// elsewhere, all points are read once for it.
 ///
 /// Heights stay as they are where the system that is asked for names none, and the output still
 /// says whose they are. `"EPSG:25832+7837"` changes their unit, or depths to heights; heights of
 /// another datum would take a grid and are refused. Heights above the ellipsoid (`"EPSG:4979"`, and
-/// the three axes of `"EPSG:4978"`) change with the place.
+/// the three axes of `"EPSG:4978"`) change with the place. Where nothing names the heights, their
+/// unit is taken for that of x and y, metres above degrees, and systems of another unit are
+/// refused.
 ///
 /// Steps of coordinates become those of the largest power of ten that is no longer on the ground,
-/// or of `scale` and `offset`, which are those of the new coordinates then; other coordinates
-/// become `f64`. Normals are not turned, which is told. Sines and the like are those of the
-/// machine: their last bit may differ from one kind of machine to another, and in rare cases a step
-/// with it.
+/// or of `scale` and `offset`, which are those of the new coordinates then; longer ones are told.
+/// Other coordinates become `f64`. Normals and directions of waveforms are not turned, which is
+/// told. Sines and the like are those of the machine: their last bit may differ from one kind of
+/// machine to another, and in rare cases a step with it.
 ///
 /// # Formats
 ///

@@ -36,8 +36,7 @@ impl Read {
         formats: &Formats,
     ) -> Box<dyn OpenSource> {
         let (keys, formats) = (self.keys(), formats.clone());
-        let reproject = self.reproject.clone();
-        Box::new(connect::InputFiles { files, format, keys, formats, reproject })
+        Box::new(connect::InputFiles { files, format, keys, formats })
     }
 
     /// The files, and a format of theirs.

@@ -10,14 +10,14 @@ impl SystemMeaning {
         matches!(self.across, Across::Angles(unit) if near(unit, DEGREE, NEAR))
     }
 
-    /// The least EPSG code of a system of x and y that means the same, heights aside.
-    pub fn horizontal_code(&self) -> Option<u32> {
-        let DatumName::Code(datum) = self.datum else { return None };
+    /// The EPSG codes of systems of x and y that mean the same, heights aside, from the least on.
+    pub fn horizontal_codes(&self) -> Vec<u32> {
+        let DatumName::Code(datum) = self.datum else { return Vec::new() };
         let flat = SystemMeaning { up: None, ..self.clone() };
         let means = |code: &u32| {
             SystemMeaning::by_code(&format!("EPSG:{code}")).is_some_and(|system| system.is(&flat))
         };
-        epsg::systems_on(datum).into_iter().find(means)
+        epsg::systems_on(datum).into_iter().filter(means).collect()
     }
 
     /// The least EPSG code of the system of its heights; None where it names none, and none inside
@@ -64,11 +64,14 @@ mod tests {
         };
         // 3044 is 25832 with its axes named in the other order.
         let utm = plain(25832, Some(7837));
-        assert_eq!((utm.horizontal_code(), utm.height_code()), (Some(3044), Some(Some(7837))));
+        assert_eq!(
+            (utm.horizontal_codes(), utm.height_code()),
+            (vec![3044, 25832], Some(Some(7837)))
+        );
         let texas = plain(2277, Some(6360));
-        assert_eq!((texas.horizontal_code(), texas.height_code()), (Some(2277), Some(Some(6360))));
+        assert_eq!((texas.horizontal_codes(), texas.height_code()), (vec![2277], Some(Some(6360))));
         let degrees = plain(4326, None);
-        assert_eq!((degrees.horizontal_code(), degrees.height_code()), (Some(4326), None));
+        assert_eq!((degrees.horizontal_codes(), degrees.height_code()), (vec![4326], None));
         assert!(degrees.is_in_degrees() && !utm.is_in_degrees());
     }
 

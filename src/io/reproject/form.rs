@@ -8,18 +8,21 @@ use crate::io::convert::Projection;
 use crate::io::steps::{REACH, reaches};
 use crate::point::names::XYZ;
 use crate::point::{Dimension, PointBatch, Scalar, Schema, Value};
-use crate::quantity::Setting;
+use crate::quantity::{Figure, Setting};
+use crate::report::Short;
 use crate::{Error, Result};
 
 /// How records of the inputs become reprojected ones, but for their coordinates.
 #[derive(Debug, Clone)]
 pub struct ReprojectedForm {
     pub schema: Schema,
+    /// What is to be told of steps that are longer on the ground than those of the inputs.
+    pub coarser: Vec<String>,
     /// How fields come to their places, where these are others.
     fields: Option<Projection>,
     axes: [Dimension; 3],
     own_axes: [Dimension; 3],
-    /// True if z is not touched.
+    /// True if heights are those of the inputs.
     keeps_heights: bool,
 }
 
@@ -30,84 +33,168 @@ pub struct AskedSteps {
     pub offset: Option<Setting<[f64; 3]>>,
 }
 
+/// Metres in a unit of each axis, of the inputs and behind.
+pub type AxisMetres = [[f64; 3]; 2];
+
 impl ReprojectedForm {
-    /// Of records of `own`, which have coordinates in units of `metres[0]` that become such of
-    /// `metres[1]` and lie in the box `place` then; z keeps its unit if `keeps_heights`.
+    /// Of records of `own`, which come to lie in the box `place`, if that is known.
     pub fn of(
         own: &Schema,
         asked: AskedSteps,
-        metres: [f64; 2],
+        metres: AxisMetres,
         place: Option<[[f64; 3]; 2]>,
         keeps_heights: bool,
     ) -> Result<ReprojectedForm> {
-        let Some(own_axes) = own.coordinates().map(|axes| axes.map(Dimension::clone)) else {
-            return Err(Error::internal("records without coordinates"));
-        };
+        let [own_axes, mut axes] = [axes_of(own)?, axes_of(own)?];
         let mut schema = own.clone();
-        let has_steps = own.layout.steps && own_axes.iter().all(|axis| !axis.scalar.is_float());
-        if !has_steps {
+        let mut coarser = Vec::new();
+        if has_steps(own) {
+            for (n, axis) in axes.iter_mut().enumerate() {
+                let given = |key: Option<Setting<[f64; 3]>>| Some(key?.given()?[n]);
+                let asked = [given(asked.scale), given(asked.offset)];
+                let place = place.map(|[lo, hi]| [lo[n], hi[n]]);
+                if n == 2 && keeps_heights {
+                    axis.scale = asked[0].unwrap_or(axis.scale);
+                    axis.origin = asked[1].unwrap_or(axis.origin);
+                } else {
+                    let ground = metres.map(|metres| metres[n]);
+                    (axis.scale, axis.origin) = steps(&own_axes[n], ground, asked, place)?;
+                }
+                coarser.extend(told_coarser(&own_axes[n], axis, metres.map(|metres| metres[n])));
+                for field in schema.dimensions.iter_mut().filter(|field| field.name == axis.name) {
+                    (field.scale, field.origin) = (axis.scale, axis.origin);
+                }
+            }
+        } else {
             to_doubles(&mut schema);
+            axes = axes_of(&schema)?;
         }
-        let places = place.map(|[lo, hi]| [0, 1, 2].map(|axis| [lo[axis], hi[axis]]));
-        for axis in 0..if has_steps { 3 } else { 0 } {
-            let field = schema.dimensions.iter_mut().find(|d| d.name == XYZ[axis]);
-            let Some(field) = field else { continue };
-            let is_kept = axis == 2 && keeps_heights;
-            let given = |key: Option<Setting<[f64; 3]>>| Some(key.and_then(Setting::given)?[axis]);
-            let [own_metres, new_metres] = if is_kept { [1.0; 2] } else { metres };
-            let step = field.scale.abs() * own_metres / new_metres;
-            let found = if is_kept { field.scale } else { power_of_ten(step) };
-            let place = places.map(|places| places[axis]);
-            let (scale, offset) = match (given(asked.scale), given(asked.offset)) {
-                (Some(scale), Some(offset)) => (scale, offset),
-                (None, None) if is_kept => continue,
-                (scale, Some(offset)) => (scale.unwrap_or(found), offset),
-                (scale, None) => reaching(scale, found, field.origin, place),
-            };
-            (field.scale, field.origin) = (scale, offset);
-        }
-        let axes = schema.coordinates().map(|axes| axes.map(Dimension::clone));
-        let axes = axes.ok_or_else(|| Error::internal("records without coordinates"))?;
         let fields = match own.stride == schema.stride {
             true => None,
             false => Some(Projection::reading(own, &schema)?),
         };
-        Ok(ReprojectedForm { schema, fields, axes, own_axes, keeps_heights })
+        Ok(ReprojectedForm { schema, coarser, fields, axes, own_axes, keeps_heights })
     }
 
-    /// Refills `records` from those of `own`; `apply` has the place of each.
+    /// Refills `records` from those of `own`; `apply` has the place of each. A point without x or y
+    /// has no place in any system; one without z has x and y as at height 0.
     pub fn fill(
         &self,
         own: &PointBatch,
         records: &mut [u8],
         apply: impl Fn([f64; 3]) -> std::result::Result<[f64; 3], String>,
-    ) -> Result<()> {
+    ) -> std::result::Result<(), BadPoint> {
         match &self.fields {
             Some(fields) => drop(fields.project_into(own.records(), records)?),
             None => records.copy_from_slice(own.records()),
         }
         let (from, to) = (own.schema().endian, self.schema.endian);
+        let [own_z, z] = [&self.own_axes[2], &self.axes[2]];
+        let is_z_there = self.keeps_heights
+            && (own_z.scalar, own_z.scale, own_z.origin) == (z.scalar, z.scale, z.origin);
+        let changed = if is_z_there { 2 } else { 3 };
         for (old, new) in own.iter().zip(records.chunks_exact_mut(self.schema.stride)) {
-            let place = [0, 1, 2].map(|axis: usize| self.own_axes[axis].world(old, from));
-            // What has no place has none in any system.
-            if !place.iter().all(|at| at.is_finite()) {
-                continue;
+            let [x, y, z] = [0, 1, 2].map(|axis: usize| self.own_axes[axis].world(old, from));
+            let has_place = x.is_finite() && y.is_finite();
+            let has_place = has_place && (z.is_finite() || self.keeps_heights);
+            let mut found = [f64::NAN; 3];
+            if has_place {
+                let place = [x, y, if z.is_finite() { z } else { 0.0 }];
+                found = apply(place).map_err(|why| BadPoint::unplaced(place, &why))?;
             }
-            let found = apply(place).map_err(|why| unplaced(place, &why))?;
-            let changed = if self.keeps_heights { 2 } else { 3 };
+            if self.keeps_heights || !z.is_finite() {
+                found[2] = z;
+            }
             for (axis, found) in self.axes.iter().zip(found).take(changed) {
                 if !put(axis, new, to, found) {
-                    return Err(beyond(axis, found));
+                    return Err(BadPoint::beyond(axis, found));
                 }
-            }
-            let z = &self.axes[2];
-            let is_moved = (z.scale, z.origin) != (self.own_axes[2].scale, self.own_axes[2].origin);
-            if self.keeps_heights && is_moved && !put(z, new, to, found[2]) {
-                return Err(beyond(z, found[2]));
             }
         }
         Ok(())
     }
+}
+
+/// Why a point has no place in the records behind.
+#[derive(Debug)]
+pub enum BadPoint {
+    /// Its place, and what would help.
+    Place(String, &'static str),
+    /// Another error than that of a point.
+    Other(Error),
+}
+
+impl From<Error> for BadPoint {
+    fn from(error: Error) -> Self {
+        BadPoint::Other(error)
+    }
+}
+
+impl BadPoint {
+    fn unplaced([x, y, z]: [f64; 3], why: &str) -> Self {
+        BadPoint::Place(
+            format!("the point at {x}, {y}, {z} cannot be reprojected: {why}"),
+            "see whether `read.crs` has to say which system the inputs are in; points far from all \
+             others are left out by a `crop` in a run before",
+        )
+    }
+
+    fn beyond(axis: &Dimension, found: f64) -> Self {
+        let told = format!(
+            "the {} {found} of a point is too far from the offset {} for steps of {}",
+            axis.name.to_ascii_lowercase(),
+            axis.origin,
+            Figure(axis.scale)
+        );
+        BadPoint::Place(told, "give `read.scale` and `read.offset` from where the steps reach it")
+    }
+}
+
+/// The coordinates of records.
+fn axes_of(schema: &Schema) -> Result<[Dimension; 3]> {
+    let axes = schema.coordinates().map(|axes| axes.map(Dimension::clone));
+    axes.ok_or_else(|| Error::internal("records without coordinates"))
+}
+
+/// True if coordinates are steps of a scale, and to stay such.
+pub fn has_steps(schema: &Schema) -> bool {
+    let is_whole = |axes: [&Dimension; 3]| axes.iter().all(|axis| !axis.scalar.is_float());
+    schema.layout.steps && schema.coordinates().is_some_and(is_whole)
+}
+
+/// Scale and offset of an axis: those that are `asked` for, else the largest power of ten that is no
+/// longer on the ground than the inputs' own, and an offset from which it reaches `place`.
+fn steps(
+    own: &Dimension,
+    [own_metres, metres]: [f64; 2],
+    asked: [Option<f64>; 2],
+    place: Option<[f64; 2]>,
+) -> Result<(f64, f64)> {
+    let found = power_of_ten(own.scale.abs() * own_metres / metres);
+    if !(found > 0.0 && found.is_finite()) {
+        let told = format!("the scale {:e} of the inputs is no length that can be kept", own.scale);
+        return Err(Error::pipeline(told).help("give `read.scale`"));
+    }
+    Ok(match asked {
+        [Some(scale), Some(offset)] => (scale, offset),
+        [None, Some(offset)] => (found, offset),
+        [scale, None] => reaching(scale, found, own.origin, place),
+    })
+}
+
+/// What is to be told of an axis whose steps are longer on the ground than they were.
+fn told_coarser(own: &Dimension, axis: &Dimension, [was, is]: [f64; 2]) -> Option<String> {
+    let [before, after] = [own.scale.abs() * was, axis.scale.abs() * is];
+    (after > before * (1.0 + 1e-6)).then(|| {
+        format!(
+            "{} is rounded to steps of {}, which are {} m on the ground; those of the inputs are \
+             {} m: `read.scale` makes them shorter",
+            axis.name.to_ascii_lowercase(),
+            Figure(axis.scale),
+            Short(after),
+            Short(before)
+        )
+    })
 }
 
 /// Stores a coordinate, as the nearest step where it has steps.
@@ -117,24 +204,6 @@ fn put(axis: &Dimension, record: &mut [u8], endian: crate::point::Endian, found:
     }
     let steps = ((found - axis.origin) / axis.scale).round();
     axis.put(record, endian, Value::Double(steps))
-}
-
-fn unplaced([x, y, z]: [f64; 3], why: &str) -> Error {
-    let told = format!("the point at {x}, {y}, {z} cannot be reprojected: {why}");
-    Error::pipeline(told).help(
-        "see whether `read.crs` has to say which system the inputs are in; points far from all \
-         others are left out by `read.box`",
-    )
-}
-
-fn beyond(axis: &Dimension, found: f64) -> Error {
-    let told = format!(
-        "the {} {found} of a point is too far from the offset {} for steps of {}",
-        axis.name.to_ascii_lowercase(),
-        axis.origin,
-        axis.scale
-    );
-    Error::pipeline(told).help("give `read.scale` and `read.offset`, which reach the points")
 }
 
 /// Gives coordinates the type `f64`, and the fields behind them their places.
@@ -165,7 +234,7 @@ fn reaching(given: Option<f64>, found: f64, own: f64, place: Option<[f64; 2]>) -
     let mut scale = given.unwrap_or(found);
     let Some(place) = place else { return (scale, own) };
     let middle = f64::midpoint(place[0], place[1]);
-    loop {
+    while scale.is_normal() {
         // Whole thousands where the steps reach that far: their digits stay readable.
         let units = [1e6, 1e3, 1.0].into_iter().filter(|unit| *unit <= scale * REACH / 4.0);
         let near = units.map(|unit| (middle / unit).round() * unit);
@@ -173,9 +242,10 @@ fn reaching(given: Option<f64>, found: f64, own: f64, place: Option<[f64; 2]>) -
         if let Some(offset) = offsets.find(|offset| reaches(place, *offset, scale)) {
             return (scale, offset);
         }
-        if given.is_some() || scale > 1e300 {
-            return (scale, middle);
+        if given.is_some() {
+            break;
         }
         scale *= 10.0;
     }
+    (scale, middle)
 }

@@ -11,17 +11,17 @@ mod tests;
 use std::sync::Arc;
 
 pub use form::AskedSteps;
-use form::ReprojectedForm;
+use form::{BadPoint, ReprojectedForm, has_steps};
 use operation::PointTransform;
-use place::{image, place_of, turn};
+use place::{ScanPlace, image, place_of, turn};
 use systems::{PlacedSystem, heights};
 
-use crate::Result;
 use crate::io::wkt;
-use crate::point::names::NORMAL;
+use crate::point::names::{NORMAL, WAVE_DIRECTION};
 use crate::point::{Metadata, PointBatch, Schema};
 use crate::report::{LostPoints, Reprojection};
 use crate::stage::{BATCH, Contradiction, Input, Part, Source};
+use crate::{Error, Result};
 
 /// The scan of `inner` in the system `to`, which is given by EPSG codes.
 ///
@@ -34,18 +34,23 @@ pub fn reprojected(inner: Box<dyn Source>, to: &str, asked: AskedSteps) -> Resul
     let metadata = inner.metadata();
     let from = PlacedSystem::of_inputs(metadata.crs.as_deref())?;
     let mut to = PlacedSystem::of_code(to)?;
-    let (change, up) = heights(&from, &to, &metadata.units)?;
-    to.up = up;
-    let place = place_of(&*inner)?;
-    let change = (change, metadata.units.vertical.unwrap_or(1.0));
-    let (transform, told) = PointTransform::between(&from, &to, change, place)?;
-    let place = place.and_then(|corners| image(&transform, corners));
+    let heights = heights(&from, &to, &metadata.units)?;
+    to.up = heights.up;
+    // Neither the operation nor the records depend on it else.
+    let is_needed = !from.has_datum_of(&to) || has_steps(inner.schema());
+    let place = if is_needed { place_of(&*inner)? } else { None };
+    let corners = place.map(|place| place.corners);
+    let up = metadata.units.vertical.unwrap_or(1.0);
+    let (transform, told) = PointTransform::between(&from, &to, (heights.change, up), corners)?;
+    let image = corners.and_then(|corners| image(&transform, corners));
+    let [was, is] = [from.metres(), to.metres()];
+    let metres = [[was, was, up], [is, is, up / heights.change.factor()]];
     let keeps = transform.keeps_heights();
-    let metres = [from.metres(), to.metres()];
-    let form = ReprojectedForm::of(inner.schema(), asked, metres, place, keeps)?;
-    let are_degrees = [from, to.clone()].map(|system| system.is_in_degrees());
-    let how = Arc::new(HowReprojected { transform, form, told, are_degrees, crs: to.text() });
-    Ok(Box::new(ReprojectedSource::new(inner, how, place)))
+    let form = ReprojectedForm::of(inner.schema(), asked, metres, image, keeps)?;
+    let are_degrees = [&from, &to].map(PlacedSystem::is_in_degrees);
+    let (notes, crs) = (heights.told, to.text());
+    let how = HowReprojected { transform, form, told, notes, are_degrees, place, image, crs };
+    Ok(Box::new(ReprojectedSource::new(inner, Arc::new(how))))
 }
 
 /// All that is decided before the points are read.
@@ -53,6 +58,11 @@ struct HowReprojected {
     transform: PointTransform,
     form: ReprojectedForm,
     told: Reprojection,
+    /// What is to be told of heights.
+    notes: Option<String>,
+    /// Where the scan is, if that had to be known, and what becomes of that box.
+    place: Option<ScanPlace>,
+    image: Option<[[f64; 3]; 2]>,
     /// Whether the systems are in degrees; None of axes from the centre of the Earth.
     are_degrees: [Option<bool>; 2],
     /// The system that the points are in then.
@@ -72,14 +82,13 @@ struct ReprojectedSource {
     how: Arc<HowReprojected>,
     schema: Arc<Schema>,
     metadata: Metadata,
-    place: Option<[[f64; 3]; 2]>,
 }
 
 impl ReprojectedSource {
-    fn new(inner: Box<dyn Source>, how: Arc<HowReprojected>, place: Option<[[f64; 3]; 2]>) -> Self {
-        let (schema, metadata) =
-            (Arc::new(how.form.schema.clone()), how.metadata(inner.metadata()));
-        ReprojectedSource { inner, how, schema, metadata, place }
+    fn new(inner: Box<dyn Source>, how: Arc<HowReprojected>) -> Self {
+        let schema = Arc::new(how.form.schema.clone());
+        let metadata = how.metadata(inner.metadata());
+        ReprojectedSource { inner, how, schema, metadata }
     }
 
     /// The part `inner` in the other system.
@@ -87,19 +96,25 @@ impl ReprojectedSource {
         Box::new(ReprojectedPart { inner, source: self, own: None })
     }
 
-    /// What is to be told of normals, which nothing turns.
-    fn told_of_normals(&self) -> Option<String> {
-        self.schema.find(NORMAL[0])?;
-        let HowReprojected { transform, told, are_degrees, .. } = &*self.how;
-        let turn = match (self.inner.claimed_box(), are_degrees) {
-            (Some(corners), [Some(from), Some(to)]) => turn(transform, corners, [*from, *to]),
+    /// What is to be told of directions, which nothing turns.
+    fn told_of_directions(&self) -> Option<String> {
+        let has = |name: &str| self.schema.find(name).is_some();
+        let what = match (has(NORMAL[0]), has(WAVE_DIRECTION[0])) {
+            (false, false) => return None,
+            (true, false) => "normals",
+            (false, true) => "directions of waveforms",
+            (true, true) => "normals and directions of waveforms",
+        };
+        let HowReprojected { transform, told, are_degrees, place, .. } = &*self.how;
+        let turn = match (place, are_degrees) {
+            (Some(place), [Some(from), Some(to)]) => turn(transform, place.corners, [*from, *to]),
             _ => None,
         };
         let turn = turn.map_or("the axes of the two turn".to_owned(), |turn| {
             format!("north turns by {turn:.3}° in the middle of the scan")
         });
         let (from, to) = (&told.from, &told.to);
-        Some(format!("normals are kept as they are; from {from} to {to} {turn}"))
+        Some(format!("{what} are kept as they are; from {from} to {to} {turn}"))
     }
 
     /// What is to be told of the operation, where points are not exactly where they were.
@@ -131,7 +146,8 @@ impl Source for ReprojectedSource {
     }
 
     fn claimed_box(&self) -> Option<[[f64; 3]; 2]> {
-        self.inner.claimed_box().and(self.place)
+        let is_claimed = self.how.place.is_some_and(|place| place.is_claimed);
+        self.how.image.filter(|_| is_claimed)
     }
 
     fn inputs(&self) -> Vec<Input> {
@@ -168,7 +184,7 @@ impl Source for ReprojectedSource {
 
     fn coarser(&self, points: u64) -> Option<Box<dyn Source>> {
         let inner = self.inner.coarser(points)?;
-        Some(Box::new(ReprojectedSource::new(inner, self.how.clone(), self.place)))
+        Some(Box::new(ReprojectedSource::new(inner, self.how.clone())))
     }
 
     fn is_read_once(&self) -> bool {
@@ -176,8 +192,9 @@ impl Source for ReprojectedSource {
     }
 
     fn warnings(&self) -> Vec<String> {
-        let own = self.told().into_iter().chain(self.told_of_normals());
-        self.inner.warnings().into_iter().chain(own).collect()
+        let how = &self.how;
+        let own = self.told().into_iter().chain(how.notes.clone()).chain(how.form.coarser.clone());
+        self.inner.warnings().into_iter().chain(own).chain(self.told_of_directions()).collect()
     }
 
     fn lost(&self) -> Vec<LostPoints> {
@@ -209,9 +226,15 @@ impl Part for ReprojectedPart<'_> {
         batch.source = own.source;
         let how = &self.source.how;
         let filled = how.form.fill(own, batch.refill(own.len()), |at| how.transform.apply(at));
-        filled.map_err(|error| match self.source.inner.inputs().get(own.source as usize) {
-            Some(input) => error.at(&input.path),
-            None => error,
+        filled.map_err(|bad| match bad {
+            BadPoint::Other(error) => error,
+            BadPoint::Place(told, help) => {
+                let inputs = self.source.inner.inputs();
+                match inputs.get(own.source as usize) {
+                    Some(input) => Error::data(&input.path, told).help(help),
+                    None => Error::pipeline(told).help(help),
+                }
+            }
         })
     }
 }

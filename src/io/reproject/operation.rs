@@ -46,8 +46,7 @@ impl PointTransform {
             Error::pipeline(told)
         };
         // Where there are no points, any operation will do.
-        let is_one_datum = from.datum().is_some() && from.datum() == to.datum();
-        let place = corners.filter(|_| !is_one_datum);
+        let place = corners.filter(|_| !from.has_datum_of(to));
         let place = place.map(|corners| area(&from.definition, corners)).transpose();
         let place = place.map_err(|why| refuse(why).help(MISPLACED))?;
         let pair = [&from.definition, &to.definition];

@@ -3,83 +3,100 @@
 use super::operation::PointTransform;
 use crate::Result;
 use crate::point::PointBatch;
+use crate::point::names::XYZ;
 use crate::stage::{BATCH, Source};
 
-/// Parts that are looked at where headers do not say where the points are.
-const LOOKS: usize = 64;
-/// Points along an edge of a box whose image is looked for.
+/// Parts of which the first points are held against the box that headers claim.
+const LOOKS: usize = 16;
+/// Bytes of records that are looked at at once, at most.
+const LOOK_BYTES: usize = 1 << 20;
+/// Steps along an edge of a box whose image is looked for.
 const ALONG: usize = 32;
-/// What is added to an image on each side, in parts of its length: edges bulge between the points.
+/// What is added to an image on each side, in parts of its length: it bulges between the points.
 const BULGE: f64 = 0.02;
 
-/// The box of a scan: what headers claim, where the first points lie in it; else that of the first
-/// points of some of its parts. None of a scan without points.
-pub fn place_of(source: &dyn Source) -> Result<Option<[[f64; 3]; 2]>> {
-    let claimed = source.claimed_box();
+/// Where a scan is.
+#[derive(Debug, Clone, Copy)]
+pub struct ScanPlace {
+    /// The smallest and the largest coordinates.
+    pub corners: [[f64; 3]; 2],
+    /// True if headers claim so, and the points that were looked at do not refute it.
+    pub is_claimed: bool,
+}
+
+/// Where a scan is: as headers claim, if the first points of some parts lie there; else all points
+/// are read for it. None of a scan without points that have a place.
+pub fn place_of(source: &dyn Source) -> Result<Option<ScanPlace>> {
     let is_box = |[lo, hi]: &[[f64; 3]; 2]| {
         (0..3).all(|axis| lo[axis] <= hi[axis] && (hi[axis] - lo[axis]).is_finite())
     };
-    let claimed = claimed.filter(is_box);
-    let mut found = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    if let Some([lo, hi]) = claimed {
-        look(source, 0, &mut found)?;
+    let parts = source.parts();
+    if let Some(corners) = source.claimed_box().filter(is_box) {
+        let [lo, hi] = corners;
+        let mut found = NOWHERE;
+        for look in 0..parts.min(LOOKS) {
+            widen(source, look * parts / parts.min(LOOKS), false, &mut found)?;
+        }
         let is_in = |axis: usize| found[0][axis] >= lo[axis] && found[1][axis] <= hi[axis];
-        if found[0][0] > found[1][0] || (0..3).all(is_in) {
-            return Ok(claimed);
+        if (0..3).all(is_in) {
+            return Ok(Some(ScanPlace { corners, is_claimed: true }));
         }
     }
-    let parts = source.parts();
-    for look_at in 0..parts.min(LOOKS) {
-        look(source, look_at * parts / parts.min(LOOKS), &mut found)?;
+    let mut corners = NOWHERE;
+    for part in 0..parts {
+        widen(source, part, true, &mut corners)?;
     }
-    Ok((found[0][0] <= found[1][0]).then_some(found))
+    let is_there = corners[0][0] <= corners[1][0];
+    Ok(is_there.then_some(ScanPlace { corners, is_claimed: false }))
 }
 
-/// Widens a box by the first points of a part.
-fn look(source: &dyn Source, part: usize, found: &mut [[f64; 3]; 2]) -> Result<()> {
-    let Some(axes) = source.schema().coordinates() else { return Ok(()) };
-    if part >= source.parts() {
-        return Ok(());
-    }
-    let mut batch = PointBatch::new(source.schema().clone(), BATCH);
-    source.part(part)?.read(&mut batch)?;
-    for record in batch.iter() {
-        let at = axes.map(|axis| axis.world(record, source.schema().endian));
-        if at.iter().all(|at| at.is_finite()) {
+const NOWHERE: [[f64; 3]; 2] = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+
+/// Widens a box by the first points of a part, or by all of them.
+fn widen(source: &dyn Source, part: usize, all: bool, corners: &mut [[f64; 3]; 2]) -> Result<()> {
+    let schema = source.schema();
+    let Some(axes) = schema.coordinates() else { return Ok(()) };
+    let names = schema.dimensions.iter().map(|dimension| dimension.name.clone());
+    let unread: Vec<String> = names.filter(|name| !XYZ.contains(&name.as_str())).collect();
+    let points = (LOOK_BYTES / schema.stride.max(1)).clamp(1, BATCH);
+    let mut batch = PointBatch::new(schema.clone(), points);
+    let mut reader = source.part_without(part, &unread)?;
+    loop {
+        reader.read(&mut batch)?;
+        for record in batch.iter() {
+            let at = axes.map(|axis| axis.world(record, schema.endian));
+            if !at.iter().all(|at| at.is_finite()) {
+                continue;
+            }
             for (axis, at) in at.into_iter().enumerate() {
-                found[0][axis] = found[0][axis].min(at);
-                found[1][axis] = found[1][axis].max(at);
+                corners[0][axis] = corners[0][axis].min(at);
+                corners[1][axis] = corners[1][axis].max(at);
             }
         }
-    }
-    Ok(())
-}
-
-/// The box of what a box becomes. None where no point of its faces has an image.
-pub fn image(transform: &PointTransform, [lo, hi]: [[f64; 3]; 2]) -> Option<[[f64; 3]; 2]> {
-    let mut found = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    let at =
-        |axis: usize, part: usize| lo[axis] + (hi[axis] - lo[axis]) * (part as f64 / ALONG as f64);
-    for (x, y, z) in edges() {
-        let Ok(image) = transform.apply([at(0, x), at(1, y), at(2, z)]) else { continue };
-        for (axis, image) in image.into_iter().enumerate() {
-            found[0][axis] = found[0][axis].min(image);
-            found[1][axis] = found[1][axis].max(image);
+        if batch.is_empty() || !all {
+            return Ok(());
         }
     }
-    let [mut low, mut high] = found;
+}
+
+/// The box of what a box becomes. None where no point of it has an image.
+pub fn image(transform: &PointTransform, [lo, hi]: [[f64; 3]; 2]) -> Option<[[f64; 3]; 2]> {
+    let [mut low, mut high] = NOWHERE;
+    let at =
+        |axis: usize, part: usize| lo[axis] + (hi[axis] - lo[axis]) * (part as f64 / ALONG as f64);
+    let each = (0..=ALONG).flat_map(|x| (0..=ALONG).flat_map(move |y| [(x, y, 0), (x, y, ALONG)]));
+    for (x, y, z) in each {
+        let Ok(image) = transform.apply([at(0, x), at(1, y), at(2, z)]) else { continue };
+        for (axis, image) in image.into_iter().enumerate() {
+            (low[axis], high[axis]) = (low[axis].min(image), high[axis].max(image));
+        }
+    }
     let changed = if transform.keeps_heights() { 2 } else { 3 };
     for (low, high) in low.iter_mut().zip(&mut high).take(changed) {
         let more = (*high - *low) * BULGE;
         (*low, *high) = (*low - more, *high + more);
     }
     (low[0] <= high[0]).then_some([low, high])
-}
-
-/// Points of a box of [`ALONG`] steps on each axis: those of its sides, at the top and the bottom.
-fn edges() -> impl Iterator<Item = (usize, usize, usize)> {
-    let sides = (0..=ALONG).flat_map(|i| [(i, 0), (i, ALONG), (0, i), (ALONG, i)]);
-    sides.flat_map(|(x, y)| [(x, y, 0), (x, y, ALONG)])
 }
 
 /// By how many degrees north turns in the middle of a box, clockwise.

@@ -4,7 +4,7 @@
 //! measured, a grid, and so do those from heights above the ellipsoid: no formula has it. So heights
 //! are kept, or change their unit alone, or both systems have them above an ellipsoid.
 
-use proj_core::{CrsDef, lookup_epsg, registry};
+use proj_core::{AxisOrder, CrsDef, lookup_epsg, registry};
 
 use crate::io::meaning::SystemMeaning;
 use crate::io::{epsg, wkt};
@@ -90,6 +90,16 @@ impl PlacedSystem {
         registry::lookup_datum_code_for_crs(self.code)
     }
 
+    /// True if both are known to be on one datum.
+    pub fn has_datum_of(&self, other: &PlacedSystem) -> bool {
+        self.datum().is_some() && self.datum() == other.datum()
+    }
+
+    /// Metres in a unit of heights that are not named, as everybody takes it: that of x and y.
+    fn height_unit(&self, said: Option<f64>) -> f64 {
+        said.unwrap_or(if self.definition.is_projected() { self.metres() } else { 1.0 })
+    }
+
     /// True if z is above the ellipsoid, or an axis from the centre of the Earth.
     fn has_place_heights(&self) -> bool {
         self.definition.is_geocentric() || self.definition.vertical_crs().is_some()
@@ -115,35 +125,57 @@ impl PlacedSystem {
 /// Metres in a degree of the equator of WGS 84.
 const METRES_IN_A_DEGREE: f64 = 111_319.490_793_273_57;
 
-/// The code of the one system that means what `text` means; that of heights must have its own.
+/// The codes of a system that means what `text` means; that of heights must have its own. Of several
+/// it is the first that is known and has east before north, as a scan has.
 fn by_meaning(text: &str) -> Option<(u32, Option<u32>)> {
     let meaning = SystemMeaning::said(text)?;
     let heights = match meaning.height_code() {
         None => None,
         Some(code) => Some(code?),
     };
-    Some((meaning.horizontal_code()?, heights))
+    let all: Vec<u32> = meaning.horizontal_codes();
+    let known = || all.iter().copied().filter(|code| lookup_epsg(*code).is_some());
+    let is_east_first =
+        |code: &u32| registry::lookup_authority_axis_order(*code) == Some(AxisOrder::EastNorth);
+    let code = known().find(is_east_first).or_else(|| known().next())?;
+    Some((code, heights))
+}
+
+/// What becomes of the heights of a scan.
+#[derive(Debug, Clone)]
+pub struct Heights {
+    pub change: HeightChange,
+    /// The EPSG code of those behind, where they have one.
+    pub up: Option<u32>,
+    /// What is to be told of them.
+    pub told: Option<String>,
+}
+
+impl HeightChange {
+    /// What the length of a height is multiplied by; 1 where it depends on the place.
+    pub fn factor(self) -> f64 {
+        match self {
+            HeightChange::Times(factor) => factor.abs(),
+            HeightChange::WithPlace => 1.0,
+        }
+    }
 }
 
 /// What becomes of the heights of a scan from one system to another, whose units are `units` as far
-/// as they are known, and the code of the heights behind.
-pub fn heights(
-    from: &PlacedSystem,
-    to: &PlacedSystem,
-    units: &Units,
-) -> Result<(HeightChange, Option<u32>)> {
-    let names = [from.text(), to.text()];
+/// as they are known.
+pub fn heights(from: &PlacedSystem, to: &PlacedSystem, units: &Units) -> Result<Heights> {
     let refuse = |told: &str| {
-        Error::pipeline(format!("`read.reproject`: from {} to {}: {told}", names[0], names[1]))
+        let pair = format!("from {} to {}", from.text(), to.text());
+        Error::pipeline(format!("`read.reproject`: {pair}: {told}"))
     };
+    let times = |factor, up| Ok(Heights { change: HeightChange::Times(factor), up, told: None });
+    let is_coded = from.up.is_some() || to.up.is_some();
     if to.has_place_heights() || from.definition.is_geocentric() {
-        let is_known = from.has_place_heights() && from.up.is_none() && to.up.is_none();
-        return match is_known {
-            true => Ok((HeightChange::WithPlace, None)),
-            false if from.up.is_some() || to.up.is_some() => Err(refuse(NEEDS_GEOID).help(KEEP)),
+        return match from.has_place_heights() && !is_coded {
+            true => with_place(from, to),
+            false if is_coded => Err(refuse(NEEDS_GEOID).help(KEEP)),
             false => Err(refuse(
-                "heights above the ellipsoid are needed, and those of the inputs \
-                                 are not named",
+                "heights above the ellipsoid are needed, and those of the inputs are not named",
             )
             .help(
                 "`read.crs` may name a system with such heights, as `EPSG:4979`; or reproject to \
@@ -155,34 +187,37 @@ pub fn heights(
         (Some(one), Some(two)) => {
             let factor =
                 if one == two { Some(1.0) } else { SystemMeaning::height_factor(one, two) };
-            let factor = factor.ok_or_else(|| refuse(NEEDS_GEOID).help(KEEP))?;
-            Ok((HeightChange::Times(factor), Some(two)))
+            times(factor.ok_or_else(|| refuse(NEEDS_GEOID).help(KEEP))?, Some(two))
         }
         (None, Some(_)) if from.has_place_heights() => Err(refuse(NEEDS_GEOID).help(KEEP)),
         (None, Some(_)) => Err(refuse("the inputs do not say which heights they have")
             .help("`read.crs` says it, as `EPSG:25832+7837`; or reproject x and y alone")),
-        (up, None) => {
-            let is_told = match units.vertical {
-                Some(metres) => metres == 1.0,
-                None => {
-                    !from.definition.is_projected()
-                        || from.metres() == 1.0
-                        || from.metres() == to.metres()
-                }
-            };
-            match up.is_some() || is_told {
-                true => Ok((HeightChange::Times(1.0), up)),
-                false => Err(refuse(
-                    "x and y change their unit, and nothing would say which unit z is in then",
-                )
-                .help(format!(
-                    "`read.crs` says which heights the inputs have: `EPSG:{}+6360` are heights in \
-                     US survey feet, `EPSG:{}+5703` in metres, both of NAVD88",
-                    from.code, from.code
-                ))),
-            }
+        (Some(up), None) => times(1.0, Some(up)),
+        (None, None) if from.has_place_heights() => with_place(from, to),
+        (None, None) if from.height_unit(units.vertical) == to.height_unit(None) => {
+            times(1.0, None)
         }
+        (None, None) => Err(refuse(
+            "the unit of heights is not named, and x and y are in another unit behind",
+        )
+        .help(format!(
+            "`read.crs` says which heights the inputs have: `EPSG:{}+6360` are heights in US \
+             survey feet, `EPSG:{}+5703` in metres, both of NAVD88",
+            from.code, from.code
+        ))),
     }
+}
+
+/// Heights above an ellipsoid, of which the system behind may say nothing.
+fn with_place(from: &PlacedSystem, to: &PlacedSystem) -> Result<Heights> {
+    let change = match to.has_place_heights() {
+        true => HeightChange::WithPlace,
+        false if from.definition.is_geocentric() => HeightChange::WithPlace,
+        false => HeightChange::Times(1.0),
+    };
+    let told = (!to.has_place_heights())
+        .then(|| format!("heights are above the ellipsoid, which EPSG:{} does not say", to.code));
+    Ok(Heights { change, up: None, told })
 }
 
 const NEEDS_GEOID: &str = "heights of the two differ by a grid that pointmill does not have";
