@@ -334,8 +334,8 @@ pub struct Write {
     /// Point data record format of LAS, 0 to 10; none: the input's, or the smallest that holds the
     /// dimensions of an input that is not LAS. Fields that it lacks must be named in `drop`, and
     /// values that it has no room for are refused; whole degrees of a scan angle become the nearest
-    /// of 0.006°, which read back as the same whole degrees. `"auto"`: as none, but the smallest that
-    /// holds what `drop` leaves.
+    /// of 0.006°, which read back as the same whole degrees. `"auto"`: as none, but the smallest
+    /// that holds what `drop` leaves.
     #[serde(default)]
     pub point_format: Option<Setting<PointFormat>>,
     /// What intensities of floating-point numbers are in LAS: `"unit"`, parts of 65535; none: whole

@@ -162,8 +162,8 @@ pub fn has_steps(schema: &Schema) -> bool {
     schema.layout.steps && schema.coordinates().is_some_and(is_whole)
 }
 
-/// Scale and offset of an axis: those that are `asked` for, else the largest power of ten that is no
-/// longer on the ground than the inputs' own, and an offset from which it reaches `place`.
+/// Scale and offset of an axis: those that are `asked` for, else the largest power of ten that is
+/// no longer on the ground than the inputs' own, and an offset from which it reaches `place`.
 fn steps(
     own: &Dimension,
     [own_metres, metres]: [f64; 2],
@@ -228,8 +228,8 @@ fn power_of_ten(step: f64) -> f64 {
     format!("1e{exponent}").parse().unwrap_or(step)
 }
 
-/// The scale `given`, or `found` or the next power of ten that reaches all of `place`, and an offset
-/// from which it does.
+/// The scale `given`, or `found` or the next power of ten that reaches all of `place`, and an
+/// offset from which it does.
 fn reaching(given: Option<f64>, found: f64, own: f64, place: Option<[f64; 2]>) -> (f64, f64) {
     let mut scale = given.unwrap_or(found);
     let Some(place) = place else { return (scale, own) };

@@ -1,8 +1,8 @@
 //! From which system to which points are brought, by EPSG codes, and what becomes of heights.
 //!
 //! Heights above mean sea level differ from one country's to the next by a surface that has to be
-//! measured, a grid, and so do those from heights above the ellipsoid: no formula has it. So heights
-//! are kept, or change their unit alone, or both systems have them above an ellipsoid.
+//! measured, a grid, and so do those from heights above the ellipsoid: no formula has it. So
+//! heights are kept, or change their unit alone, or both systems have them above an ellipsoid.
 
 use proj_core::{AxisOrder, CrsDef, lookup_epsg, registry};
 
@@ -125,8 +125,8 @@ impl PlacedSystem {
 /// Metres in a degree of the equator of WGS 84.
 const METRES_IN_A_DEGREE: f64 = 111_319.490_793_273_57;
 
-/// The codes of a system that means what `text` means; that of heights must have its own. Of several
-/// it is the first that is known and has east before north, as a scan has.
+/// The codes of a system that means what `text` means; that of heights must have its own. Of
+/// several it is the first that is known and has east before north, as a scan has.
 fn by_meaning(text: &str) -> Option<(u32, Option<u32>)> {
     let meaning = SystemMeaning::said(text)?;
     let heights = match meaning.height_code() {
@@ -143,7 +143,7 @@ fn by_meaning(text: &str) -> Option<(u32, Option<u32>)> {
 
 /// What becomes of the heights of a scan.
 #[derive(Debug, Clone)]
-pub struct Heights {
+pub struct NewHeights {
     pub change: HeightChange,
     /// The EPSG code of those behind, where they have one.
     pub up: Option<u32>,
@@ -163,12 +163,12 @@ impl HeightChange {
 
 /// What becomes of the heights of a scan from one system to another, whose units are `units` as far
 /// as they are known.
-pub fn heights(from: &PlacedSystem, to: &PlacedSystem, units: &Units) -> Result<Heights> {
+pub fn heights(from: &PlacedSystem, to: &PlacedSystem, units: &Units) -> Result<NewHeights> {
     let refuse = |told: &str| {
         let pair = format!("from {} to {}", from.text(), to.text());
         Error::pipeline(format!("`read.reproject`: {pair}: {told}"))
     };
-    let times = |factor, up| Ok(Heights { change: HeightChange::Times(factor), up, told: None });
+    let times = |factor, up| Ok(NewHeights { change: HeightChange::Times(factor), up, told: None });
     let is_coded = from.up.is_some() || to.up.is_some();
     if to.has_place_heights() || from.definition.is_geocentric() {
         return match from.has_place_heights() && !is_coded {
@@ -209,7 +209,7 @@ pub fn heights(from: &PlacedSystem, to: &PlacedSystem, units: &Units) -> Result<
 }
 
 /// Heights above an ellipsoid, of which the system behind may say nothing.
-fn with_place(from: &PlacedSystem, to: &PlacedSystem) -> Result<Heights> {
+fn with_place(from: &PlacedSystem, to: &PlacedSystem) -> Result<NewHeights> {
     let change = match to.has_place_heights() {
         true => HeightChange::WithPlace,
         false if from.definition.is_geocentric() => HeightChange::WithPlace,
@@ -217,7 +217,7 @@ fn with_place(from: &PlacedSystem, to: &PlacedSystem) -> Result<Heights> {
     };
     let told = (!to.has_place_heights())
         .then(|| format!("heights are above the ellipsoid, which EPSG:{} does not say", to.code));
-    Ok(Heights { change, up: None, told })
+    Ok(NewHeights { change, up: None, told })
 }
 
 const NEEDS_GEOID: &str = "heights of the two differ by a grid that pointmill does not have";
