@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use rayon::ThreadPool;
 
 use super::accepted::accepted;
-use super::demanded::{demands, lists_bytes};
+use super::demanded::{FilesOfOutputs, demands, lists_bytes};
 use super::limits::{check_limits, number_selections};
 use super::look::{Unfit, look, look_at_corners};
 use super::meshes::{connected, triangulations};
@@ -121,8 +121,10 @@ impl Graph {
         let tagger = tagger(&sorted.ops, &passes.passes, &choices, &ranks, schema, &settings)?;
         let order = WriteOrder::new(&sorted, &*source)?;
         let (lattice, doubt) = lattice(&settings, (&*source, schema), &sorted.ops, order.mills)?;
-        let demands = demands(&sorted, &passes, (&*source, schema), (&order, &lattice), &settings)?;
-        let besides = (lists_bytes(&each, &splits, &ranks), connected(&sorted, &*source));
+        let (from, ordered) = ((&*source, schema), (&order, &lattice));
+        let files = FilesOfOutputs { each: &each, splits: &splits };
+        let demands = demands(&sorted, &passes, from, ordered, files, &settings)?;
+        let besides = (lists_bytes(files, &ranks), connected(&sorted, &*source));
         let demands = divided(demands, besides, tagger.tags())?;
         let mut warnings = warnings(&*source, &sorted, &schemas, &settings)?;
         warnings.extend(doubt.into_iter().chain(wide).chain(not_beside(&*source, &sorted.sinks)));
