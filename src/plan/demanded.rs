@@ -17,8 +17,7 @@ use crate::point::{Metadata, Schema};
 use crate::stage::{ChunkSize, CreateSink, OutputSplit, Source};
 use crate::{Error, Result};
 
-/// What a run depends on in its memory, but the
-/// [lists](lists_bytes) of outputs that are several files.
+/// What a run depends on in its memory.
 pub(super) fn demands(
     sorted: &Sorted,
     Passes { passes, computed, .. }: &Passes,
@@ -41,7 +40,7 @@ pub(super) fn demands(
     let arranging = lattice.as_ref().map(|on| arranging(sorted, &metadata, (schema, on), at_once));
     Ok(Demands {
         arranging: arranging.transpose()?.unwrap_or_default(),
-        lists: by_rank::lists_bytes(source.points()) * ranked,
+        lists: by_rank::lists_bytes(source.points()) * ranked + lists_bytes(files),
         ranked: ranked > 0,
         mills: order.mills,
         filters: passes.iter().any(Pass::streams),
@@ -67,6 +66,8 @@ pub(super) struct FilesOfOutputs<'a> {
     pub each: &'a [Vec<Box<dyn CreateSink>>],
     /// For each sink how it is split, if it is.
     pub splits: &'a [Option<OutputSplit>],
+    /// The rank of each input.
+    pub ranks: &'a [u32],
 }
 
 impl FilesOfOutputs<'_> {
@@ -111,10 +112,7 @@ fn is_plain(sorted: &Sorted, (source, schema): (&dyn Source, &Arc<Schema>)) -> R
 }
 
 /// Bytes of the lists of outputs that are a file for each input, or that are split.
-pub(super) fn lists_bytes(
-    FilesOfOutputs { each, splits }: FilesOfOutputs<'_>,
-    ranks: &[u32],
-) -> Bytes {
+fn lists_bytes(FilesOfOutputs { each, splits, ranks }: FilesOfOutputs<'_>) -> Bytes {
     let folders = each.iter().filter(|each| !each.is_empty()).count() as u64;
     let split = splits.iter().flatten().count() as u64;
     by_input::lists_bytes(ranks.len()) * folders + by_split::lists_bytes() * split

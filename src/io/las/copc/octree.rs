@@ -15,9 +15,10 @@
 //!
 //! In Morton order a cell of any size is a stretch without gaps: it is settled as soon as a point
 //! lies outside, so one winner for each size is held, besides the points of the nodes around the
-//! present one. Of a surface these are few, as a level more quadruples its points; a scan that is as
-//! dense around its scanner on every level fills all of them, and the fullest is stored where they
-//! come to more than is held. Nothing that is written depends on that, on tiles, threads or memory.
+//! present one. Of a surface these are few, as a level more quadruples its points; a scan that is
+//! as dense around its scanner on every level fills all of them, and the fullest is stored where
+//! they come to more than is held. Nothing that is written depends on that, on tiles, threads or
+//! memory.
 //!
 //! Small nodes cost bytes and requests. A node whose subtree has few points is one leaf, and what
 //! would be a node of very few points goes to the one above it.
@@ -41,8 +42,8 @@ pub const LEAF_POINTS: usize = 1 << 16;
 /// fullest is stored.
 const OPEN_PIECES: usize = 7;
 /// Pieces that an octree holds at most: those, one that grows, whose memory is there twice for a
-/// moment, and nodes that became ripe within a chunk of points, which filled no more than its points
-/// do and the doubling of memory leaves empty.
+/// moment, and nodes that became ripe within a chunk of points, which filled no more than its
+/// points do and the doubling of memory leaves empty.
 pub const HELD_PIECES: usize = OPEN_PIECES + 1 + 2;
 const _: () = assert!(CHUNK_POINTS as usize <= LEAF_POINTS);
 /// A node of fewer points below another is part of that.
