@@ -17,17 +17,18 @@ use std::ffi::OsStr;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
-use super::arranged::FileExtent;
+use super::arranged::ground;
 use super::job::Job;
 use super::publish::{Staged, folder_of};
 use super::row::RowLayout;
 use crate::budget::Bytes;
 use crate::error::shown;
+use crate::geom::lattice::Lattice;
 use crate::host::lock;
-use crate::point::{Metadata, PointBatch, Schema};
+use crate::point::{Bounds, Metadata, PointBatch, Position, Schema};
 use crate::report::Grouped;
 use crate::stage::{
-    BATCH, ChunkSize, CreateSink, Encode, Encoded, OutputSplit, Sink, SinkSummary, SplitKey,
+    ChunkSize, CreateSink, Encode, Encoded, Extent, OutputSplit, Sink, SinkSummary, SplitKey,
 };
 use crate::store::{RecordState, Spill, StoredStretch};
 use crate::{Error, Result};
@@ -46,6 +47,8 @@ struct SplitList {
     open: Vec<u8>,
     last: Option<StoredStretch>,
     records: u64,
+    /// The box of its records, where files arrange them.
+    bounds: Bounds,
 }
 
 /// The records that an output gets, by file; within one they stay in their order.
@@ -54,6 +57,8 @@ pub(crate) struct BySplit {
     sorter: SplitSorter,
     schema: Arc<Schema>,
     layout: RowLayout,
+    /// What files arrange their points on, if they do.
+    ground: Option<Lattice>,
     spill: Spill,
     lists: Mutex<SplitLists>,
 }
@@ -104,8 +109,9 @@ impl BySplit {
             OutputSplit::Points(points) => SplitSorter::Points(*points),
             OutputSplit::Bytes(bytes) => measured(job, sink, split, *bytes)?,
         };
+        let ground = ground(job, &*job.task.sinks[sink], &job.task.metadata(sink, None))?;
         let (spill, split) = (Spill::new(&job.area, "split"), split.clone());
-        Ok(BySplit { split, sorter, schema, layout, spill, lists: Mutex::default() })
+        Ok(BySplit { split, sorter, schema, layout, ground, spill, lists: Mutex::default() })
     }
 
     /// Bytes of a record with its row.
@@ -113,8 +119,9 @@ impl BySplit {
         self.schema.stride + self.layout.bytes()
     }
 
-    /// Takes `entries`, records of the file `key` each with its row.
-    fn take(&self, key: SplitKey, entries: &[u8]) -> Result<()> {
+    /// Takes `entries`, records of the file `key` each with its row, and where they are off the
+    /// front of `places`.
+    fn take(&self, key: SplitKey, entries: &[u8], places: &mut &[Position]) -> Result<()> {
         let lists = &mut *lock(&self.lists);
         let full = lists.files.len() >= MOST_FILES;
         if full && !lists.files.contains_key(&key) {
@@ -123,7 +130,11 @@ impl BySplit {
         }
         let list = lists.files.entry(key).or_default();
         list.open.extend_from_slice(entries);
-        list.records += (entries.len() / self.entry()) as u64;
+        let records = entries.len() / self.entry();
+        list.records += records as u64;
+        let (of_these, later) = places.split_at(places.len().min(records));
+        of_these.iter().for_each(|at| list.bounds.add(*at));
+        *places = later;
         lists.open += entries.len();
         if lists.open > OPEN_BYTES {
             lists.files.values_mut().try_for_each(|list| self.store(list))?;
@@ -196,18 +207,13 @@ impl BySplit {
         lock(&self.lists).files.values().map(|list| list.records).sum()
     }
 
-    /// Looks for where the records of a file are, batch by batch.
-    fn look(&self, job: &Job<'_>, list: &SplitList, extent: &FileExtent) -> Result<()> {
-        let mut batch = PointBatch::new(self.schema.clone(), BATCH);
-        self.each(list, |entries| {
-            entries.chunks(self.entry() * BATCH).try_for_each(|entries| {
-                batch.clear();
-                let records = entries.chunks_exact(self.entry());
-                records.for_each(|entry| batch.extend(&entry[..self.schema.stride]));
-                extent.add(&batch);
-                job.advance(0)
-            })
-        })
+    /// Where the records of a batch are; nothing where no file arranges them. One that has no place
+    /// is told when its file is written.
+    fn places(&self, batch: &PointBatch) -> Vec<Position> {
+        let Some(lattice) = &self.ground else { return Vec::new() };
+        let mut places = vec![[0; 3]; batch.len()];
+        lattice.place(batch.schema(), batch.records(), |i, at| places[i] = at, |_, _| {});
+        places
     }
 
     fn write_one(
@@ -224,9 +230,8 @@ impl BySplit {
         let (points, encoder) = (sink.chunk_points(), sink.encoder());
         let by_time = by_time(job, number, create);
         let mut batch = PointBatch::new(self.schema.clone(), points);
-        if let Some(extent) = FileExtent::of(job, create, &metadata)? {
-            self.look(job, list, &extent)?;
-            sink.arrange(&extent.told())?;
+        if let Some(lattice) = &self.ground {
+            sink.arrange(&Extent::new(lattice.clone(), list.bounds))?;
         }
         let mut rows = Vec::new();
         let mut append = |batch: &mut PointBatch, rows: &mut Vec<u8>| {
@@ -321,7 +326,7 @@ impl Sink for SplitSink {
     }
 
     fn append(&mut self, chunk: Encoded) -> Result<()> {
-        let mut rest = &chunk.bytes[..];
+        let (mut rest, mut places) = (&chunk.bytes[..], &chunk.places[..]);
         while let Some((head, more)) = rest.split_at_checked(GROUP) {
             let word = |n: usize| {
                 let mut bytes = [0; 8];
@@ -331,11 +336,12 @@ impl Sink for SplitSink {
             let (entries, more) = more.split_at(word(2) as usize);
             let files = &self.files;
             match files.sorter.is_by_place() {
-                false => files.take([word(0), word(1)], entries)?,
+                false => files.take([word(0), word(1)], entries, &mut places)?,
                 true => {
                     let each = (entries, files.entry());
                     let (sorter, measured) = (&files.sorter, word(0) as u64);
-                    self.next.put(sorter, each, measured, |key, some| files.take(key, some))?;
+                    let take = |key, some| files.take(key, some, &mut places);
+                    self.next.put(sorter, each, measured, take)?;
                 }
             }
             rest = more;
@@ -363,22 +369,26 @@ impl Encode for SplitEncoder {
             })
             .collect::<Result<_>>()?;
         let measured = [files.sorter.measure(batch)? as i64, 0];
-        let mut groups: BTreeMap<SplitKey, Vec<u8>> = BTreeMap::new();
+        let places = files.places(batch);
+        let mut groups: BTreeMap<SplitKey, (Vec<u8>, Vec<Position>)> = BTreeMap::new();
         for (i, record) in batch.iter().enumerate() {
             let key = files.sorter.key(record, schema.endian)?.unwrap_or(measured);
-            let group = groups.entry(key).or_default();
+            let (group, places_of_group) = groups.entry(key).or_default();
+            places_of_group.extend(places.get(i));
             group.extend_from_slice(record);
             columns.iter().for_each(|(values, size)| {
                 group.extend_from_slice(&values[i * size..(i + 1) * size]);
             });
         }
         let mut bytes = Vec::with_capacity(batch.len() * files.entry() + GROUP * groups.len());
-        for ([a, b], entries) in groups {
+        let mut sorted = Vec::with_capacity(places.len());
+        for ([a, b], (entries, places)) in groups {
+            sorted.extend(places);
             bytes.extend_from_slice(&a.to_le_bytes());
             bytes.extend_from_slice(&b.to_le_bytes());
             bytes.extend_from_slice(&(entries.len() as i64).to_le_bytes());
             bytes.extend_from_slice(&entries);
         }
-        Ok(Encoded::new(bytes, batch.len() as u64))
+        Ok(Encoded { places: sorted, ..Encoded::new(bytes, batch.len() as u64) })
     }
 }

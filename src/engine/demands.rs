@@ -185,8 +185,7 @@ impl Demands {
     /// What is held while the files of a split are written.
     pub fn splitting(&self) -> Holders {
         let writing = writing_bytes(self.chunk, self.stride + self.columns.row);
-        let arranged = (ARRANGING, self.by_threads(self.arranging.of_split));
-        let arranging = self.arranges_split().then_some(arranged);
+        let arranging = self.arranges_split().then_some((ARRANGING, self.arranging.of_split));
         let writing = ("writing of split files", self.by_threads(writing));
         Holders::of([writing].into_iter().chain(arranging))
     }

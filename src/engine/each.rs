@@ -69,6 +69,7 @@ impl ByInput {
         let points = sink.chunk_points();
         let encoders = ChunkEncoders::of_one(job, tiles, number, &*sink, create.likes_time());
         if let Some(extent) = FileExtent::of(job, &**create, &metadata)? {
+            // What is listed of a record is its number, and stages may move it on its way here.
             let extent = Arc::new(extent);
             let look = encoders.looked_at_by(extent.clone());
             self.each_chunk(rank, points, |chunk| {

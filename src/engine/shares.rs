@@ -75,9 +75,9 @@ pub struct Demands {
 /// Bytes that outputs which arrange points hold besides their chunks while they are open.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Arranging {
-    /// All that grow while tiles are milled.
+    /// All that grow while tiles are milled, and those of the inputs that are written at once.
     pub milled: Bytes,
-    /// A file of a split, of which each thread writes one.
+    /// The files of a split that are written at once.
     pub of_split: Bytes,
 }
 

@@ -13,29 +13,34 @@ use crate::engine::{by_input, by_rank, by_split};
 use crate::geom::lattice::Lattice;
 use crate::graph::{MOST_THREADS, RunSettings};
 use crate::host::process::{default_memory, processors};
-use crate::point::{ComputedDimension, Metadata, Schema};
+use crate::point::{Metadata, Schema};
 use crate::stage::{ChunkSize, CreateSink, OutputSplit, Source};
 use crate::{Error, Result};
 
-/// What a run depends on in its memory, but the
-/// [lists](lists_bytes) of outputs that are several files.
+/// What a run depends on in its memory.
 pub(super) fn demands(
     sorted: &Sorted,
     Passes { passes, computed, .. }: &Passes,
     (source, schema): (&dyn Source, &Arc<Schema>),
     (order, lattice): (&WriteOrder, &Option<Lattice>),
+    files: FilesOfOutputs<'_>,
     settings: &RunSettings,
 ) -> Result<Demands> {
     let threads = threads(settings)?;
     let limit = settings.memory.unwrap_or_else(default_memory);
-    let chunks = chunks(sorted, computed, (source, schema))?;
+    let metadata: Vec<Metadata> = computed
+        .iter()
+        .map(|computed| Metadata { computed: computed.clone(), ..source.metadata().clone() })
+        .collect();
+    let chunks = chunks(sorted, &metadata, schema)?;
     let columns = passes.iter().map(|pass| pass.column_bytes(computed));
     let ranked =
         order.in_input_order.iter().filter(|ranked| **ranked && order.mills).count() as u64;
-    let arranging = lattice.as_ref().map(|on| arranging(sorted, (source, schema), on, threads));
+    let at_once = |sink: usize| files.at_once(sink, source.points()).min(threads as u64);
+    let arranging = lattice.as_ref().map(|on| arranging(sorted, &metadata, (schema, on), at_once));
     Ok(Demands {
         arranging: arranging.transpose()?.unwrap_or_default(),
-        lists: by_rank::lists_bytes(source.points()) * ranked,
+        lists: by_rank::lists_bytes(source.points()) * ranked + lists_bytes(files),
         ranked: ranked > 0,
         mills: order.mills,
         filters: passes.iter().any(Pass::streams),
@@ -54,23 +59,46 @@ pub(super) fn demands(
     })
 }
 
-/// What open outputs hold that arrange points on `lattice`.
+/// The files of outputs that are several.
+#[derive(Clone, Copy)]
+pub(super) struct FilesOfOutputs<'a> {
+    /// For each sink those that are one for each input.
+    pub each: &'a [Vec<Box<dyn CreateSink>>],
+    /// For each sink how it is split, if it is.
+    pub splits: &'a [Option<OutputSplit>],
+    /// The rank of each input.
+    pub ranks: &'a [u32],
+}
+
+impl FilesOfOutputs<'_> {
+    /// How many `sink` has at most, as far as that is known of so many points.
+    fn at_once(&self, sink: usize, points: u64) -> u64 {
+        match (self.splits.get(sink), self.each.get(sink)) {
+            (Some(Some(OutputSplit::Points(most))), _) => points.div_ceil((*most).max(1)).max(1),
+            (Some(Some(_)), _) => points.max(1),
+            (_, Some(each)) => each.len().max(1) as u64,
+            _ => 1,
+        }
+    }
+}
+
+/// What open outputs hold that arrange points on `lattice`, where of the files of a sink so many
+/// are open `at_once`.
 fn arranging(
     sorted: &Sorted,
-    (source, schema): (&dyn Source, &Arc<Schema>),
-    lattice: &Lattice,
-    threads: usize,
+    metadata: &[Metadata],
+    (schema, lattice): (&Arc<Schema>, &Lattice),
+    at_once: impl Fn(usize) -> u64,
 ) -> Result<Arranging> {
     let mut arranging = Arranging::default();
-    for (sink, written) in sorted.sinks.iter().zip(&sorted.endings) {
-        let held = sink.arranged(lattice, schema, source.metadata());
+    let sinks = sorted.sinks.iter().zip(&sorted.endings).zip(metadata);
+    for (n, ((sink, written), metadata)) in sinks.enumerate() {
+        let held = sink.arranged(lattice, schema, metadata);
         let held = Bytes(held.map_err(|error| blame(&**written, error))?.unwrap_or(0));
-        let Arranging { milled, of_split } = &mut arranging;
-        match () {
-            () if sink.is_split() => *of_split = held.max(*of_split),
-            // Each thread writes one at a time.
-            () if sink.is_folder() => *milled += held * threads as u64,
-            () => *milled += held,
+        let held = held * at_once(n);
+        match sink.is_split() {
+            true => arranging.of_split = held.max(arranging.of_split),
+            false => arranging.milled += held,
         }
     }
     Ok(arranging)
@@ -84,11 +112,7 @@ fn is_plain(sorted: &Sorted, (source, schema): (&dyn Source, &Arc<Schema>)) -> R
 }
 
 /// Bytes of the lists of outputs that are a file for each input, or that are split.
-pub(super) fn lists_bytes(
-    each: &[Vec<Box<dyn CreateSink>>],
-    splits: &[Option<OutputSplit>],
-    ranks: &[u32],
-) -> Bytes {
+fn lists_bytes(FilesOfOutputs { each, splits, ranks }: FilesOfOutputs<'_>) -> Bytes {
     let folders = each.iter().filter(|each| !each.is_empty()).count() as u64;
     let split = splits.iter().flatten().count() as u64;
     by_input::lists_bytes(ranks.len()) * folders + by_split::lists_bytes() * split
@@ -107,16 +131,11 @@ fn threads(settings: &RunSettings) -> Result<usize> {
 }
 
 /// The chunks of all outputs.
-fn chunks(
-    sorted: &Sorted,
-    computed: &[Vec<ComputedDimension>],
-    (source, schema): (&dyn Source, &Arc<Schema>),
-) -> Result<Vec<ChunkSize>> {
+fn chunks(sorted: &Sorted, metadata: &[Metadata], schema: &Arc<Schema>) -> Result<Vec<ChunkSize>> {
     let (mut chunks, mut wrong) = (Vec::new(), Vec::new());
     let sinks = sorted.sinks.iter().zip(&sorted.endings);
-    for ((sink, written), computed) in sinks.zip(computed) {
-        let metadata = Metadata { computed: computed.clone(), ..source.metadata().clone() };
-        match sink.chunk(schema, &metadata) {
+    for ((sink, written), metadata) in sinks.zip(metadata) {
+        match sink.chunk(schema, metadata) {
             Ok(chunk) => chunks.push(chunk),
             Err(error) => wrong.push(blame(&**written, error)),
         }

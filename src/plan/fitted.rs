@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use rayon::ThreadPool;
 
 use super::accepted::accepted;
-use super::demanded::{demands, lists_bytes};
+use super::demanded::{FilesOfOutputs, demands};
 use super::limits::{check_limits, number_selections};
 use super::look::{Unfit, look, look_at_corners};
 use super::meshes::{connected, triangulations};
@@ -112,8 +112,7 @@ impl Graph {
         let FittedStages { source, schemas, choices, passes, given, accept } =
             fit_stages(&mut sorted, rules, wrong)?;
         settle(&mut sorted, &*source, &settings)?;
-        let schema = &schemas.last;
-        let read = all_read(&*sorted.source.1, &*source);
+        let (schema, read) = (&schemas.last, all_read(&*sorted.source.1, &*source));
         let mut files = right(places(&read, &sorted.sinks))?;
         let (each, ranks) = each_input(&*source, &sorted.sinks, &settings, &mut files)?;
         let (splits, wide) = splits((&*source, schema), &sorted.sinks, &settings, &read)?;
@@ -121,9 +120,10 @@ impl Graph {
         let tagger = tagger(&sorted.ops, &passes.passes, &choices, &ranks, schema, &settings)?;
         let order = WriteOrder::new(&sorted, &*source)?;
         let (lattice, doubt) = lattice(&settings, (&*source, schema), &sorted.ops, order.mills)?;
-        let demands = demands(&sorted, &passes, (&*source, schema), (&order, &lattice), &settings)?;
-        let besides = (lists_bytes(&each, &splits, &ranks), connected(&sorted, &*source));
-        let demands = divided(demands, besides, tagger.tags())?;
+        let files = FilesOfOutputs { each: &each, splits: &splits, ranks: &ranks };
+        let (from, ordered) = ((&*source, schema), (&order, &lattice));
+        let demands = demands(&sorted, &passes, from, ordered, files, &settings)?;
+        let demands = divided(demands, connected(&sorted, &*source), tagger.tags())?;
         let mut warnings = warnings(&*source, &sorted, &schemas, &settings)?;
         warnings.extend(doubt.into_iter().chain(wide).chain(not_beside(&*source, &sorted.sinks)));
         let task = Task {
@@ -173,9 +173,9 @@ fn right<T>((found, wrong): (T, Vec<Error>)) -> Result<T> {
     Ok(found)
 }
 
-/// The demands with these lists by input and such a mesh besides, if the memory does for them.
-fn divided(demands: Demands, (lists, connected): (Bytes, Bytes), tagged: bool) -> Result<Demands> {
-    let demands = Demands { lists: demands.lists + lists, tagged, connected, ..demands };
+/// The demands with such a mesh besides, if the memory does for them.
+fn divided(demands: Demands, connected: Bytes, tagged: bool) -> Result<Demands> {
+    let demands = Demands { tagged, connected, ..demands };
     demands.divide()?;
     Ok(demands)
 }

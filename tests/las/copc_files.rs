@@ -7,7 +7,7 @@ use las::CopcReader;
 use pointmill::synth::Scene;
 
 use super::copc::levels;
-use crate::support::command::done;
+use crate::support::command::{done, pointmill};
 use crate::support::runs::{Memory, Settings, run};
 use crate::support::scan::Scan;
 
@@ -125,4 +125,35 @@ fn inputs_in_a_folder_become_copc_each_with_its_own_offset() {
     assert_eq!(none.keys().collect::<Vec<_>>(), one.keys().collect::<Vec<_>>());
     assert!(none.values().all(|path| levels(path) == [0]));
     assert_eq!(files(&at.join("laz")).keys().collect::<Vec<_>>(), ["east.laz", "west.laz"]);
+}
+
+#[test]
+fn what_arranging_holds_is_planned_for_the_files_that_are_open_at_once() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    std::fs::create_dir(at.join("in")).unwrap();
+    for seed in ["1", "2"] {
+        let path = format!("in/{seed}.laz");
+        done(at, &["synth", "als", "-n", "3000", "--seed", seed, "-o", &path, "--quiet"]);
+    }
+    // What the refusal of a budget that is too small says of it.
+    let arranging = |write: &str, threads: &str| {
+        let text = format!("read in ! {write}");
+        let run = ["run", &text, "--memory", "1MiB", "--threads", threads];
+        let (_, _, told) = pointmill(at, &run);
+        let (before, _) = told.split_once(" MiB for the arranging of points").expect(&told);
+        let figure = before.rsplit([' ', '(']).next().and_then(|n| n.parse::<f64>().ok());
+        figure.expect(&told)
+    };
+    let one = arranging("write one.copc.laz", "1");
+    let [folder, number] = ["write folder=out format=copc", "write {number}.copc.laz points=3000"];
+    for (write, threads, files) in
+        [(folder, "1", 1.0), (folder, "2", 2.0), (folder, "8", 2.0), (number, "3", 2.0)]
+    {
+        let planned = arranging(write, threads);
+        assert!((planned / one - files).abs() < 0.1, "{write}, {threads}: {planned}, {one}");
+    }
+    let normals = "normals ! write one.copc.laz dimensions=[NormalX,NormalY,NormalZ]";
+    let with_normals = arranging(normals, "1");
+    assert!(with_normals > 1.2 * one, "dimensions are left out: {with_normals}, {one}");
 }

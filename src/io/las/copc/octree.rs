@@ -15,7 +15,10 @@
 //!
 //! In Morton order a cell of any size is a stretch without gaps: it is settled as soon as a point
 //! lies outside, so one winner for each size is held, besides the points of the nodes around the
-//! present one. Nothing depends on tiles, threads or memory.
+//! present one. Of a surface these are few, as a level more quadruples its points; a scan that is
+//! as dense around its scanner on every level fills all of them, and the fullest is stored where
+//! they come to more than is held. Nothing that is written depends on that, on tiles, threads or
+//! memory.
 //!
 //! Small nodes cost bytes and requests. A node whose subtree has few points is one leaf, and what
 //! would be a node of very few points goes to the one above it.
@@ -24,6 +27,7 @@ use super::hierarchy::VoxelKey;
 use super::overflow::{NodePiece, Overflow};
 use crate::Result;
 use crate::geom::morton::morton_cmp;
+use crate::io::las::laz::CHUNK_POINTS;
 use crate::point::{Bounds, Position};
 use crate::store::split_level;
 
@@ -34,10 +38,14 @@ const CELLS: u32 = 7;
 const DEEPEST: u32 = 24;
 /// A subtree of so many points is one node.
 pub const LEAF_POINTS: usize = 1 << 16;
-/// Pieces of so many points that open nodes hold, about: a piece for each level on which nodes have
-/// others below them, with the room that vectors leave; a level more quadruples the points of a
-/// surface.
-pub const HELD_PIECES: usize = 10;
+/// Pieces of so many points that the nodes have memory for that may still get points, before the
+/// fullest is stored.
+const OPEN_PIECES: usize = 7;
+/// Pieces that an octree holds at most: those, one that grows, whose memory is there twice for a
+/// moment, and nodes that became ripe within a chunk of points, which filled no more than its
+/// points do and the doubling of memory leaves empty.
+pub const HELD_PIECES: usize = OPEN_PIECES + 1 + 2;
+const _: () = assert!(CHUNK_POINTS as usize <= LEAF_POINTS);
 /// A node of fewer points below another is part of that.
 const FEWEST_POINTS: usize = 1 << 11;
 
@@ -99,15 +107,22 @@ struct Winner {
 #[derive(Debug, Default)]
 struct OpenNode {
     /// Its own points.
-    own: Vec<u8>,
+    own: NodePiece,
     /// Earlier ones, in whole pieces.
     full: Vec<NodePiece>,
     /// Nodes below it that become part of it if they are few.
-    children: Vec<(VoxelKey, Vec<u8>)>,
+    children: Vec<(VoxelKey, NodePiece)>,
     /// Bytes of these.
     below: usize,
     /// True if there are nodes below it.
     is_inner: bool,
+}
+
+impl OpenNode {
+    /// Bytes of memory that it has.
+    fn held(&self) -> usize {
+        self.own.held() + self.children.iter().map(|(_, below)| below.held()).sum::<usize>()
+    }
 }
 
 /// An octree that grows by points in Morton order.
@@ -124,6 +139,8 @@ pub struct Octree {
     /// The nodes around the last point, by the exponents of their sides from the smallest on.
     open: Vec<OpenNode>,
     ripe: Vec<RipeNode>,
+    /// Bytes of memory that open nodes have at most.
+    most_held: usize,
     overflow: Overflow,
 }
 
@@ -142,6 +159,7 @@ impl Octree {
             smallest,
             open: (0..nodes).map(|_| OpenNode::default()).collect(),
             ripe: Vec::new(),
+            most_held: OPEN_PIECES * LEAF_POINTS * stride,
             overflow,
         }
     }
@@ -220,9 +238,10 @@ impl Octree {
     fn give(&mut self, winner: Winner, exponent: u32) -> Result<()> {
         let at = winner.slot * self.stride;
         let number = exponent.saturating_sub(self.smallest) as usize;
-        self.open[number].own.extend_from_slice(&self.slots[at..at + self.stride]);
+        let record = &self.slots[at..at + self.stride];
+        let grew = self.open[number].own.extend(record, LEAF_POINTS * self.stride);
         self.free.push(winner.slot);
-        self.store_full(number)
+        self.store_full(number, grew)
     }
 
     /// Closes the open node of this number.
@@ -241,16 +260,15 @@ impl Octree {
             self.become_inner(number);
         }
         let OpenNode { own, mut full, children, .. } = std::mem::take(&mut self.open[number]);
-        let records = children.into_iter().fold(own, |mut all, (_, below)| {
-            all.extend(below);
-            all
-        });
+        let mut records = own;
+        records.shrink();
+        children.into_iter().for_each(|(_, below)| records.append(below));
         if is_leaf && !is_root {
             self.hand_up(number + 1, key, records);
             return Ok(());
         }
         if !records.is_empty() || full.is_empty() {
-            full.push(NodePiece::Held(records));
+            full.push(records);
         }
         self.ripe.push(RipeNode { key, pieces: full });
         if !is_root {
@@ -264,27 +282,31 @@ impl Octree {
     fn merge_up(&mut self, number: usize) -> Result<()> {
         let mut own = std::mem::take(&mut self.open[number].own);
         let above = &mut self.open[number + 1].own;
-        match above.is_empty() {
-            true => std::mem::swap(above, &mut own),
-            false => {
-                let room = LEAF_POINTS * self.stride - above.len();
-                let (first, rest) = own.split_at(own.len().min(room));
-                above.extend_from_slice(first);
-                self.store_full(number + 1)?;
-                self.open[number + 1].own.extend_from_slice(rest);
+        if above.is_empty() {
+            std::mem::swap(above, &mut own);
+        } else {
+            let room = LEAF_POINTS * self.stride - above.len();
+            let is_held = own.held() >= own.len();
+            let records = own.records()?;
+            let (first, rest) = records.split_at(records.len().min(room));
+            for some in [first, rest] {
+                let above = &mut self.open[number + 1].own;
+                let grew = above.extend(some, LEAF_POINTS * self.stride);
+                self.store_full(number + 1, grew)?;
             }
+            own = if is_held { NodePiece::of(records) } else { NodePiece::default() };
         }
-        own.clear();
         // Keeps its memory for the next.
+        own.clear();
         self.open[number].own = own;
         Ok(())
     }
 
     /// Hands a leaf to the node above, which may take it for its own.
-    fn hand_up(&mut self, number: usize, key: VoxelKey, records: Vec<u8>) {
+    fn hand_up(&mut self, number: usize, key: VoxelKey, records: NodePiece) {
         let node = &mut self.open[number];
         if node.is_inner {
-            self.ripe.push(RipeNode { key, pieces: vec![NodePiece::Held(records)] });
+            self.ripe.push(RipeNode { key, pieces: vec![records] });
             return;
         }
         node.below += records.len();
@@ -300,17 +322,25 @@ impl Octree {
         node.is_inner = true;
         node.below = 0;
         let children = std::mem::take(&mut node.children).into_iter();
-        let nodes =
-            children.map(|(key, below)| RipeNode { key, pieces: vec![NodePiece::Held(below)] });
-        self.ripe.extend(nodes);
+        self.ripe.extend(children.map(|(key, below)| RipeNode { key, pieces: vec![below] }));
     }
 
-    /// Stores the points of an open node that has as many as are held.
-    fn store_full(&mut self, number: usize) -> Result<()> {
+    /// Stores the points of an open node that has as many as a piece; where its memory `grew`, too,
+    /// those of the fullest nodes, as long as all have more than they may.
+    fn store_full(&mut self, number: usize, grew: bool) -> Result<()> {
         let node = &mut self.open[number];
         if node.own.len() >= LEAF_POINTS * self.stride {
-            node.full.push(self.overflow.store(&node.own)?);
-            node.own.clear();
+            let mut piece = std::mem::take(&mut node.own);
+            self.overflow.store(&mut piece)?;
+            node.full.push(piece);
+        }
+        while grew && self.open.iter().map(OpenNode::held).sum::<usize>() > self.most_held {
+            let Some(fullest) = self.open.iter_mut().max_by_key(|node| node.held()) else { break };
+            let children = fullest.children.iter_mut().map(|(_, below)| below);
+            [&mut fullest.own]
+                .into_iter()
+                .chain(children)
+                .try_for_each(|piece| self.overflow.store(piece))?;
         }
         Ok(())
     }

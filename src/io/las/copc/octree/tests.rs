@@ -5,25 +5,41 @@ use proptest::prelude::*;
 use super::*;
 use crate::geom::morton::morton_cmp;
 
-/// The positions of all nodes, of records that hold a position and a number each.
-fn nodes(points: &[Position]) -> (RootCube, BTreeMap<VoxelKey, Vec<(Position, u64)>>) {
+/// A position and a number, as a record has them.
+type Numbered = (Position, u64);
+
+/// The pieces of all nodes, of records that hold a position and a number each, of an octree whose
+/// open nodes have at most so many bytes, if that is not what it has by itself; and whether one was
+/// stored before it had as many records as a piece.
+fn pieces(
+    points: &[Position],
+    most_held: Option<usize>,
+) -> (RootCube, BTreeMap<VoxelKey, Vec<Vec<Numbered>>>, bool) {
     let folder = tempfile::tempdir().unwrap();
     let mut points = points.to_vec();
     points.sort_by(morton_cmp);
     let root = RootCube::around(&Bounds::of(points.iter().copied()));
     let mut octree = Octree::new(root, 32, Overflow::at(&folder.path().join("nodes")));
-    let mut found = BTreeMap::new();
+    octree.most_held = most_held.unwrap_or(octree.most_held);
+    let most_held = octree.most_held;
+    let (mut found, mut stored) = (BTreeMap::new(), false);
     let mut keep = |octree: &mut Octree| {
         for node in octree.ripe() {
-            let records: Vec<u8> =
-                node.pieces.into_iter().flat_map(|piece| piece.records().unwrap()).collect();
             let words = |record: &[u8]| -> [i64; 4] {
                 std::array::from_fn(|n| {
                     i64::from_le_bytes(record[8 * n..8 * n + 8].try_into().unwrap())
                 })
             };
-            let all = records.chunks_exact(32).map(words);
-            let all = all.map(|[x, y, z, n]| ([x, y, z], n as u64)).collect();
+            let numbered = |record: &[u8]| {
+                let [x, y, z, n] = words(record);
+                ([x, y, z], n as u64)
+            };
+            let records = |piece: NodePiece| {
+                let (len, records) = (piece.len(), piece.records().unwrap());
+                assert_eq!(records.len(), len);
+                records.chunks_exact(32).map(numbered).collect()
+            };
+            let all: Vec<Vec<Numbered>> = node.pieces.into_iter().map(records).collect();
             assert!(found.insert(node.key, all).is_none(), "{:?} twice", node.key);
         }
     };
@@ -31,11 +47,21 @@ fn nodes(points: &[Position]) -> (RootCube, BTreeMap<VoxelKey, Vec<(Position, u6
         let record: Vec<u8> =
             p.iter().copied().chain([n as i64]).flat_map(i64::to_le_bytes).collect();
         octree.push(*p, rank(None, *p), &record).unwrap();
+        let held: usize = octree.open.iter().map(OpenNode::held).sum();
+        assert!(held <= most_held, "{held} bytes are held");
+        let early = |node: &OpenNode| node.own.held() == 0 && !node.own.is_empty();
+        stored |= octree.open.iter().any(early);
         keep(&mut octree);
     }
     octree.finish().unwrap();
     keep(&mut octree);
-    (root, found)
+    (root, found, stored)
+}
+
+/// The records of all nodes.
+fn nodes(points: &[Position]) -> (RootCube, BTreeMap<VoxelKey, Vec<Numbered>>) {
+    let (root, pieces, _) = pieces(points, None);
+    (root, pieces.into_iter().map(|(key, pieces)| (key, pieces.concat())).collect())
 }
 
 /// What must hold of any points.
@@ -115,6 +141,39 @@ fn more_copies_than_are_held_are_stored_and_found_again() {
     let mut points = vec![[77, 78, 79]; 3 * LEAF_POINTS + 5];
     points.push([1 << 50, 0, -(1 << 50)]);
     check(&points);
+}
+
+/// Points that are as dense around a scanner on every level: each shell, twice as wide as the one
+/// inside, has as many.
+fn around_a_scanner(shells: u32, each: usize) -> Vec<Position> {
+    let mut seed = 7;
+    let mut at = |half: i64| random(&mut seed).cast_signed().rem_euclid(2 * half) - half;
+    let mut points = Vec::new();
+    for shell in 0..shells {
+        let half = 1i64 << (CELLS + shell);
+        let begin = points.len();
+        while points.len() < begin + each {
+            let p = [at(half), at(half), at(half)];
+            // Off the corner of all cubes, so that the dense part lies within open nodes.
+            let is_outside = p.iter().any(|v| v.abs() >= half / 2);
+            if is_outside {
+                points.push(p.map(|v| v + (1i64 << (CELLS + shells)) / 3));
+            }
+        }
+    }
+    points
+}
+
+#[test]
+fn a_scan_that_fills_all_levels_is_held_within_bounds_and_becomes_the_same_nodes() {
+    let points = around_a_scanner(14, 45_000);
+    let (_, own, stored) = pieces(&points, None);
+    assert!(stored, "what is held by itself does for all");
+    assert!(own.keys().map(|key| key.level).max() >= Some(10));
+    let (_, unbounded, stored) = pieces(&points, Some(usize::MAX));
+    assert!(!stored && own == unbounded, "what is held plays a part");
+    let (_, little, stored) = pieces(&points, Some(LEAF_POINTS * 16));
+    assert!(stored && own == little, "what is held plays a part");
 }
 
 proptest! {
