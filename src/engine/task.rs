@@ -98,7 +98,9 @@ impl Task {
 
     /// What an input says, for its own output or for that of all.
     pub fn said(&self, metadata: Metadata) -> Metadata {
-        let moved = *self.schemas.last != **self.source.schema();
+        // Stages may move points and leave the form of their records as it is.
+        let moved = *self.schemas.last != **self.source.schema()
+            || self.transforms.iter().any(|stage| stage.moves());
         Metadata { moved: moved || metadata.moved, ..metadata }
     }
 

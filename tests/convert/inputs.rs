@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::support::case_file;
-use crate::support::command::{done, fails};
+use crate::support::command::{done, fails, pointmill};
 
 /// Copies of these files of `tests/cases` in a folder.
 fn inputs(names: &[&str]) -> tempfile::TempDir {
@@ -65,8 +65,7 @@ fn coordinates_that_one_scale_rounds_are_told_and_the_order_of_inputs_changes_no
     let run = |first, second, out| {
         let all = ["reduce", first, second, "-o", out, "--keep", "100%", "--no-provenance"];
         let offset = ["--offset", "0,0,0"];
-        let (code, _, told) =
-            crate::support::command::pointmill(at, &[&all[..], &offset[..]].concat());
+        let (code, _, told) = pointmill(at, &[&all[..], &offset[..]].concat());
         assert_eq!(code, 0, "{told}");
         assert!(told.contains("23c.las: coordinates were rounded"), "{told}");
         std::fs::read(at.join(out)).unwrap()
@@ -220,14 +219,25 @@ fn las_1_5_is_read_and_its_outputs_are_las_1_4_of_the_same_meaning() {
     fails(at, &["convert", "c.las", "-o", "o.las"], 1, &["c.las", "header"]);
 }
 
+/// What a record of the formats with waveforms says of its own.
+const WAVES: &str = "WavePacketDescriptorIndex,WavePacketByteOffset,WavePacketSize,\
+                     WaveReturnPoint,WaveXt,WaveYt,WaveZt";
+
 #[test]
 fn gps_times_of_two_kinds_are_told_apart_and_go_together_without_times() {
     let at = tempfile::tempdir().unwrap();
     let at = at.path();
-    let later = "GpsTime,Overlap,ScannerChannel";
-    for (format, timeless, drop) in
-        [("1", "0", "GpsTime"), ("3", "2", "GpsTime"), ("6", "0", later), ("7", "2", later)]
-    {
+    for (format, timeless, drop) in [
+        ("1", "0", "GpsTime".to_owned()),
+        ("3", "2", "GpsTime".to_owned()),
+        ("4", "0", format!("GpsTime,{WAVES}")),
+        ("5", "2", format!("GpsTime,{WAVES}")),
+        ("6", "0", "Overlap,ScannerChannel,GpsTime".to_owned()),
+        ("7", "2", "Overlap,ScannerChannel,GpsTime".to_owned()),
+        ("8", "2", "Overlap,ScannerChannel,GpsTime,Nir".to_owned()),
+        ("9", "0", format!("Overlap,ScannerChannel,GpsTime,{WAVES}")),
+        ("10", "2", format!("Overlap,ScannerChannel,GpsTime,Nir,{WAVES}")),
+    ] {
         let colors = if timeless == "2" { [",Red,Green,Blue", ",1,2,3"] } else { [""; 2] };
         for (name, x) in [("week.las", 1), ("standard.las", 2)] {
             let [head, values] = colors;
@@ -246,11 +256,14 @@ fn gps_times_of_two_kinds_are_told_apart_and_go_together_without_times() {
             &remedy,
             &format!("--drop {drop}"),
         ];
-        fails(at, &["convert", "week.las", "standard.las", "-o", "o.las"], 1, &told);
+        let merge = ["convert", "week.las", "standard.las", "-o", "o.las"];
+        fails(at, &merge, 1, &told);
+        let (_, _, told) = pointmill(at, &merge);
+        assert_eq!(told.contains("classes above 31"), format.len() > 1 || format > "5", "{told}");
         // As it says.
         for name in ["week", "standard"] {
             let (from, to) = (format!("{name}.las"), format!("{name}-0.las"));
-            let more = ["--point-format", timeless, "--drop", drop, "--quiet"];
+            let more = ["--point-format", timeless, "--drop", &drop, "--quiet"];
             done(at, &[&["convert", &from, "-o", &to], &more[..]].concat());
         }
         done(at, &["convert", "week-0.las", "standard-0.las", "-o", "o.las", "--quiet"]);
@@ -260,5 +273,52 @@ fn gps_times_of_two_kinds_are_told_apart_and_go_together_without_times() {
         for begins in ["1.00,2.00,3.00,", "2.00,2.00,3.00,"] {
             assert!(lines.next().unwrap().starts_with(begins), "{all}");
         }
+    }
+}
+
+#[test]
+fn values_that_no_format_without_times_holds_go_together_by_way_of_ply() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    for (format, drop) in [
+        ("6", "GpsTime".to_owned()),
+        ("7", "GpsTime".to_owned()),
+        ("8", "GpsTime".to_owned()),
+        ("9", format!("GpsTime,{WAVES}")),
+        ("10", format!("GpsTime,{WAVES}")),
+    ] {
+        let has_nir = matches!(format, "8" | "10");
+        let [head, value] = if has_nir { [",Nir", ",40000"] } else { ["", ""] };
+        for (name, x) in [("week.las", 1), ("standard.las", 2)] {
+            let csv = format!(
+                "X,Y,Z,GpsTime,Classification,ReturnNumber,ScanAngle{head}\n\
+                 {x},2,3,100,64,9,12.498{value}\n"
+            );
+            std::fs::write(at.join("t.csv"), csv).unwrap();
+            let more = ["--scale", "0.01", "--point-format", format, "--quiet"];
+            done(at, &[&["convert", "t.csv", "-o", name], &more[..]].concat());
+        }
+        let mut bytes = std::fs::read(at.join("standard.las")).unwrap();
+        bytes[6] |= 1;
+        std::fs::write(at.join("standard.las"), bytes).unwrap();
+        let told = ["convert each file to PLY", &format!("--drop {drop}`, and these PLY files")];
+        fails(at, &["convert", "week.las", "standard.las", "-o", "o.las"], 1, &told);
+        for name in ["week", "standard"] {
+            let (from, to) = (format!("{name}.las"), format!("{name}.ply"));
+            done(at, &["convert", &from, "-o", &to, "--drop", &drop, "--quiet"]);
+        }
+        let merge = ["convert", "week.ply", "standard.ply", "-o", "o.las", "--scale", "0.01"];
+        done(at, &[&merge[..], &["--quiet"]].concat());
+        let of = |scan: &str| text(at, scan).lines().map(str::to_owned).collect::<Vec<_>>();
+        let all = of("o.las");
+        let names: Vec<&str> = all[0].split(',').collect();
+        for (line, x) in all[1..].iter().zip(["1.00", "2.00"]) {
+            let values: Vec<&str> = line.split(',').collect();
+            let value = |name: &str| values[names.iter().position(|n| *n == name).unwrap()];
+            let found = ["X", "Classification", "ReturnNumber", "ScanAngle"].map(value);
+            assert_eq!(found, [x, "64", "9", "12.498"], "{format}");
+            assert!(!has_nir || value("Nir") == "40000", "{format}");
+        }
+        assert_eq!(all.len(), 3);
     }
 }

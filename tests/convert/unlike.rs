@@ -134,6 +134,39 @@ fn fields_that_a_pcd_lacks_are_nothing_there() {
 }
 
 #[test]
+fn coordinates_of_a_pcd_text_keep_their_digits_beside_bytes() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    let head = |fields: &str, size: u8, data: &str| {
+        let count = fields.split(' ').count();
+        let each = |of: &str| vec![of; count].join(" ");
+        let (sizes, types) = (each(&size.to_string()), each("F"));
+        format!("FIELDS {fields}\nSIZE {sizes}\nTYPE {types}\nWIDTH 1\nDATA {data}\n")
+    };
+    let text = |fields: &str, line: &str| head(fields, 4, "ascii") + line;
+    fs::write(at.join("t.pcd"), text("x y z", "638123.4567 1 2\n")).unwrap();
+    fs::write(at.join("more.pcd"), text("x y z tag", "638123.4567 1 2 3\n")).unwrap();
+    let double = [0.1, 5.0, 6.0].map(f64::to_le_bytes);
+    let bytes = [head("x y z", 8, "binary").as_bytes(), double.as_flattened()].concat();
+    fs::write(at.join("d.pcd"), bytes).unwrap();
+    let float = [0.25, 5.0, 6.0].map(f32::to_le_bytes);
+    let bytes = [head("x y z", 4, "binary").as_bytes(), float.as_flattened()].concat();
+    fs::write(at.join("f.pcd"), bytes).unwrap();
+    let all = assumed(at, ["more.pcd", "d.pcd"], "o.pcd");
+    assert_eq!(all, ["X,Y,Z,tag", "638123.4567,1,2,3", "0.1,5,6,0"]);
+    // Nothing is to be assumed of files that have the same fields.
+    for (other, told) in [("d.pcd", "0.1,5,6"), ("f.pcd", "0.25,5,6")] {
+        for (n, scans) in [["t.pcd", other], [other, "t.pcd"]].into_iter().enumerate() {
+            let out = ["-o", "o.pcd", "--quiet", "--no-provenance"];
+            done(at, &[&["convert"], &scans[..], &out].concat());
+            let mut expected = ["638123.4567,1,2", told];
+            expected.rotate_left(n);
+            assert_eq!(lines(at, "o.pcd")[1..], expected);
+        }
+    }
+}
+
+#[test]
 fn columns_that_a_text_lacks_are_nothing_there() {
     let at = tempfile::tempdir().unwrap();
     let at = at.path();

@@ -197,3 +197,39 @@ fn a_point_that_would_be_none_is_refused_or_left_out_and_counted() {
     done(at, &["convert", "a.csv", "-o", "o.ply", "--quiet"]);
     assert_eq!(points(at, "o.ply"), ["X,Y,Z", "1,2,3", "nan,2,3", "4,5,6"]);
 }
+
+#[test]
+fn where_the_sensor_was_is_carried_unless_points_were_moved() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    let head = header(["x y z", "4 4 4", "F F F", "1 1 1"], 1, 1, "ascii");
+    let viewpoint = |name: &str| {
+        let head = String::from_utf8_lossy(&fs::read(at.join(name)).unwrap()).into_owned();
+        head.lines().find_map(|line| line.strip_prefix("VIEWPOINT ")).unwrap().to_owned()
+    };
+    let own = "7 8 9 0 1 0 0";
+    write(at, "v.pcd", &head.replace("0 0 0 1 0 0 0", own), b"1 2 3\n");
+    write(at, "none.pcd", &head, b"1 2 3\n");
+    done(at, &["convert", "v.pcd", "-o", "o.pcd", "--quiet"]);
+    assert_eq!(viewpoint("o.pcd"), own);
+    let not_carried = "VIEWPOINT is not carried";
+    for (stage, moves) in [
+        ("transform translate=[10,0,0]", true),
+        ("transform rotate={axis='z',angle='30 deg'}", true),
+        ("filter where='X > 0'", false),
+    ] {
+        for name in ["v", "none"] {
+            let line = format!("read {name}.pcd ! {stage} ! write o.pcd");
+            let (code, _, told) = pointmill(at, &["run", &line]);
+            assert_eq!(code, 0, "{told}");
+            assert_eq!(told.contains(not_carried), moves && name == "v", "{stage}: {told}");
+            let kept = if name == "v" && !moves { own } else { "0 0 0 1 0 0 0" };
+            assert_eq!(viewpoint("o.pcd"), kept, "{stage}");
+        }
+    }
+    let reproject = ["--crs", "EPSG:25832", "--reproject", "EPSG:25833"];
+    let run = [&["convert", "v.pcd", "-o", "o.pcd"], &reproject[..]].concat();
+    let (code, _, told) = pointmill(at, &run);
+    assert!(code == 0 && told.contains(not_carried), "{told}");
+    assert_eq!(viewpoint("o.pcd"), "0 0 0 1 0 0 0");
+}

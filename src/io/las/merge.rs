@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::extra::Descriptor;
 use super::fields::encoding;
 use super::form::{OneForm, help};
-use super::format::{has_gps_time, has_waveforms};
+use super::format::{has_gps_time, has_waveforms, layout};
 use super::found::{holding, smallest};
 use super::header::Header;
 use super::input::LasInput;
@@ -19,7 +19,7 @@ use super::vlr::Evlr;
 use crate::error::shown;
 use crate::io::steps::whole_steps;
 use crate::io::systems::{remedy, told_apart};
-use crate::point::GpsTime;
+use crate::point::{GpsTime, names};
 use crate::{Error, Result};
 
 /// Files that are to be read as one scan, taken in one by one: of each only its header is kept, and
@@ -119,18 +119,33 @@ fn other_times(a: &LasInput, b: &LasInput) -> Error {
     };
     let (one, two) = (shown(&a.path), shown(&b.path));
     let why = format!("their GPS time type differs: {one} has {}; {two} has {}", kind(a), kind(b));
-    let format = a.header.format();
-    let timeless = if matches!(format, 3 | 5 | 7 | 8 | 10) { 2 } else { 0 };
-    // What formats 6 and above have besides.
-    let drop = match format {
-        ..=5 => "\"GpsTime\"",
-        _ => "\"GpsTime\", \"Overlap\", \"ScannerChannel\"",
-    };
-    refuse(a, b, why).help(format!(
+    refuse(a, b, why).help(without_times(a.header.format()))
+}
+
+/// How files of a point format go together without their times.
+fn without_times(format: u8) -> String {
+    let fields = |format| layout(format, &[], [1.0; 3], [0.0; 3]);
+    let own = fields(format);
+    let timeless = if own.find(names::RED).is_some() { 2 } else { 0 };
+    let held = fields(timeless);
+    let all = own.dimensions.iter().map(|field| field.name.as_str());
+    let drop: Vec<&str> = all.filter(|name| held.find(name).is_none()).collect();
+    let mut help = format!(
         "no file says which week it is of, so that neither can be made of the other; without times \
          they go together: convert each by itself first, with `write.point_format = {timeless}` \
-         and `write.drop = [{drop}]`"
-    ))
+         and `write.drop = {drop:?}`"
+    );
+    if format >= 6 {
+        // Waveforms are in one file, and stay with it.
+        let is_lost = |name: &&str| *name == names::GPS_TIME || name.starts_with("Wave");
+        let drop: Vec<&str> = drop.into_iter().filter(is_lost).collect();
+        help += &format!(
+            ". All point formats from 6 on have times, and {timeless} does not hold classes above \
+             31, return numbers above 7 and fractions of a degree: where there are such values, \
+             convert each file to PLY with `write.drop = {drop:?}`, and these PLY files to LAS"
+        );
+    }
+    help
 }
 
 fn other_extras(a: &LasInput, b: &LasInput) -> Error {

@@ -131,9 +131,10 @@ impl PcdFile {
         names
     }
 
-    /// What a record holds, coordinates of `float` as `double` if they are to be `wide`; and where
-    /// each number of a point goes, None for padding.
+    /// What a record holds, coordinates that a text calls `float` as `double` if they are to be
+    /// `wide`; and where each number of a point goes, None for padding.
     pub fn schema(&self, wide: bool) -> (Schema, Vec<Option<(Scalar, usize)>>) {
+        let wide = wide && self.header.data == PcdData::Ascii;
         let (mut dimensions, mut numbers, mut stride) = (Vec::new(), Vec::new(), 0);
         let mut names = self.names().into_iter();
         let has_colors = |names: &[Dimension]| names.iter().any(|d| d.name == RED);

@@ -50,6 +50,21 @@ pub(crate) fn field_name(dimension: &str) -> String {
     if name.is_empty() || name == "_" { "unnamed".to_owned() } else { name }
 }
 
+/// Where the sensor was of points whose input does not say it.
+const UPRIGHT: [f64; 7] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
+
+/// Where the sensor was; and what is to be told if the input says it of points that were moved.
+fn viewpoint(native: Option<&PcdNative>, metadata: &Metadata) -> ([f64; 7], Option<String>) {
+    match native.and_then(|native| native.viewpoint) {
+        Some(own) if metadata.moved && own != UPRIGHT => {
+            let told = "the input's VIEWPOINT is not carried: the points were moved, and the \
+                        header says 0 0 0 1 0 0 0";
+            (UPRIGHT, Some(told.to_owned()))
+        }
+        own => (own.unwrap_or(UPRIGHT), None),
+    }
+}
+
 /// What stands above the points.
 struct PcdHeadings {
     comments: String,
@@ -86,8 +101,7 @@ impl PcdHeadings {
         let has_times = columns.iter().any(|column| column.name == GPS_TIME);
         let mut comments = lines("# ", metadata, has_times);
         comments.extend(metadata.comments.iter().map(|comment| line("# ", comment)));
-        let upright = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
-        let viewpoint = native.and_then(|native| native.viewpoint).unwrap_or(upright);
+        let viewpoint = viewpoint(native, metadata).0;
         let data = if is_binary { PcdData::Binary } else { PcdData::Ascii };
         PcdHeadings { comments, note, fields, viewpoint, data }
     }
@@ -141,6 +155,7 @@ pub(super) fn create(
         PcdHeadings::of(&shape.columns, encoding, metadata, native.as_deref(), note.clone())
     };
     let mut file = RowFile::create(staged, plan, heading)?;
+    file.notes.extend(viewpoint(native.as_deref(), metadata).1);
     file.notes.extend(left_out);
     Ok(Box::new(file))
 }

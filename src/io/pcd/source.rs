@@ -75,7 +75,10 @@ fn schema_of_all(files: &[PcdFile], own: &[Arc<Schema>], is_nothing: bool) -> Re
     let Some(odd) = own.iter().position(|schema| *schema != own[0]) else {
         return Ok(own[0].clone());
     };
-    if !is_nothing {
+    // Texts whose coordinates are held wide go with others that have the same types.
+    let narrow = |file: &PcdFile| file.schema(false).0;
+    let is_one = files.iter().all(|file| narrow(file) == narrow(&files[0]));
+    if !is_nothing && !is_one {
         let names = |n: usize| own[n].dimensions.iter().map(|dimension| &dimension.name);
         let paths = [&*files[odd].path, &files[0].path];
         return Err(unlike(paths, "fields", names(odd), names(0)));
@@ -112,28 +115,26 @@ fn metadata(files: &[PcdFile], said: Said, crs: Option<String>) -> Metadata {
     }
 }
 
-/// True if coordinates of these texts are to be held as `double`, so that none loses a digit: where
-/// one has more than a `float` holds, or where another file calls them `double`.
+/// True if coordinates that texts call `float` are to be held as `double`, so that none loses a
+/// digit: where one has more than a `float` holds, or where another file calls them `double`.
 fn needs_double(files: &[PcdFile]) -> Result<bool> {
-    if files.iter().any(|file| file.header.data != PcdData::Ascii) {
-        return Ok(false);
-    }
-    let mut is_double = false;
-    for file in files {
-        let names = file.names();
-        let scalars: Vec<Option<Scalar>> =
-            file.schema(false).1.into_iter().map(|n| Some(n?.0)).collect();
-        let of = |wanted: Scalar| -> Vec<usize> {
-            let is_axis = |n: &usize| XYZ.contains(&names[*n].as_str());
-            (0..names.len()).filter(is_axis).filter(|&n| scalars[n] == Some(wanted)).collect()
+    let axes = |file: &PcdFile, wanted: Scalar| -> Vec<usize> {
+        let numbers = file.names().into_iter().zip(file.schema(false).1).enumerate();
+        let is_it = |name: &str, number: Option<(Scalar, usize)>| {
+            XYZ.contains(&name) && number.is_some_and(|(scalar, _)| scalar == wanted)
         };
-        is_double |= !of(Scalar::F64).is_empty();
-        let floats = of(Scalar::F32);
-        if !floats.is_empty() && !is_double {
-            is_double |= ascii(file, false)?.outgrow_float(&floats, file.losses.part())?;
+        numbers.filter(|(_, (name, number))| is_it(name, *number)).map(|(n, _)| n).collect()
+    };
+    if files.iter().any(|file| !axes(file, Scalar::F64).is_empty()) {
+        return Ok(true);
+    }
+    for file in files.iter().filter(|file| file.header.data == PcdData::Ascii) {
+        let floats = axes(file, Scalar::F32);
+        if !floats.is_empty() && ascii(file, false)?.outgrow_float(&floats, file.losses.part())? {
+            return Ok(true);
         }
     }
-    Ok(is_double)
+    Ok(false)
 }
 
 fn ascii(file: &PcdFile, wide: bool) -> Result<AsciiPoints<'_>> {

@@ -72,6 +72,11 @@ impl<'a> Lines<'a> {
         &self.window[start..end]
     }
 
+    /// What the window holds from `start` on, which may end within a line.
+    pub fn held(&self, start: usize) -> &[u8] {
+        &self.window[start..self.end]
+    }
+
     /// The byte of the file that is at `place` of the window.
     pub fn byte(&self, place: usize) -> u64 {
         self.from + place as u64

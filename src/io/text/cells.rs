@@ -9,7 +9,7 @@ use std::fs::File;
 use std::path::Path;
 
 use super::names::LONGEST_LINE;
-use super::ptx::{HEAD_LINES, PtxReader, PtxScan, begin, is_empty};
+use super::ptx::{HEAD_LINES, PtxReader, PtxScan, begin, is_empty, may_begin_scan};
 use super::survey::{Surveyor, TextSurvey};
 use crate::error::shown;
 use crate::io::damage::{PartLosses, advised};
@@ -187,7 +187,9 @@ impl<'a> CellSurvey<'a> {
     /// If damage is mended and the first lines of a scan begin with this one, goes back to it.
     fn turns_to_scan(&mut self, (start, end): (usize, usize)) -> Result<bool> {
         let lines = &self.reader.lines;
-        if !self.lost.mends() || !is_count(lines.text(start, end)) {
+        // Most lines that are no cell begin no scan either, and a second reader is dear.
+        let may_begin = || is_count(lines.text(start, end)) && may_begin_scan(lines.held(start));
+        if !self.lost.mends() || !may_begin() {
             return Ok(false);
         }
         let (from, before) = (lines.byte(start), lines.number() - 1);
@@ -295,15 +297,20 @@ const CUT: &str = "the file is cut short, or the counts before its cells are wro
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stage::OnError;
 
     const HEAD: &str = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
 
     fn surveyed(text: &str) -> Result<(PtxText, TextSurvey)> {
+        surveyed_with(text, PartLosses::default())
+    }
+
+    fn surveyed_with(text: &str, lost: PartLosses) -> Result<(PtxText, TextSurvey)> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.ptx");
         std::fs::write(&path, text).unwrap();
         let file = File::open(&path).unwrap();
-        survey_cells(file, &path, text.len() as u64, PartLosses::default())
+        survey_cells(file, &path, text.len() as u64, lost)
     }
 
     #[test]
@@ -332,5 +339,39 @@ mod tests {
         assert!(told("1 2 3\n").contains("by its first bytes"));
         let odd = format!("1\n1\n{HEAD}{}1 2 3 0.5\n", pose.replace("0 0 1 0", "0 0 1 7"));
         assert!(told(&odd).contains("the matrix of a scan"));
+    }
+
+    #[test]
+    fn lines_that_are_no_cell_are_looked_at_where_they_are_held() {
+        use crate::io::text::ptx::may_begin_scan;
+        let pose = "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
+        let head = format!("3\n2\n{HEAD}{pose}");
+        for text in ["5\n5\n5\n", "5\n1 2 3\n", "5\nfive\n", "5\r5\r1 2 3\r5\r"] {
+            assert!(!may_begin_scan(text.as_bytes()), "{text:?}");
+        }
+        // Where the bytes end before that is known, whoever reads on finds out.
+        for end in 0..=head.len() {
+            assert!(may_begin_scan(&head.as_bytes()[..end]), "{end}");
+        }
+        assert!(may_begin_scan(head.replace('\n', " \r\n\r\n").as_bytes()));
+    }
+
+    #[test]
+    fn a_scan_behind_lines_that_are_no_cell_is_found_wherever_the_window_ends() {
+        let pose = "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
+        let head = |rows: usize| format!("1\n{rows}\n{HEAD}{pose}");
+        let first = head(1 << 20) + "1 2 3 0.5\n";
+        let next = head(1) + "4 5 6 0.5\n";
+        let window = Lines::bytes(LONGEST_LINE);
+        for end in (0..=next.len()).step_by(3) {
+            let between = "5\n".repeat((window - first.len() - end) / 2);
+            let text = format!("{first}{between}{next}");
+            let lost = PartLosses::new(OnError::Salvage);
+            let (ptx, survey) = surveyed_with(&text, lost).unwrap();
+            assert_eq!((ptx.scans.len(), survey.points), (2, 2), "{end}");
+            // The cells behind these lines are lost with them, and no line is one twice.
+            let last = survey.lost.told().pop().unwrap();
+            assert!(last.contains("1,048,575 points are lost"), "{end}: {last}");
+        }
     }
 }

@@ -23,8 +23,10 @@ pub(super) const FAMILY: &str = "PTX";
 /// What messages call a PTX file.
 pub(super) const CALLED: &str = "a PTX file";
 
+/// How many numbers are on each line of a scan before its cells.
+const HEAD: [usize; 10] = [1, 1, 3, 3, 3, 3, 4, 4, 4, 4];
 /// Lines of a scan before its cells.
-pub(super) const HEAD_LINES: u64 = 10;
+pub(super) const HEAD_LINES: u64 = HEAD.len() as u64;
 
 /// First bytes that tell whether a file is PTX.
 const FIRST: u64 = 512;
@@ -89,8 +91,16 @@ pub(super) fn is_empty(line: &[u8]) -> bool {
 pub(super) fn sniff(first: &[u8]) -> bool {
     let mut lines = first.split(|&b| b == b'\n');
     let mut numbers = || lines.next().map(|line| Delimiter::Blanks.numbers(line));
-    let counts = [1, 1, 3, 3, 3, 3];
-    counts.into_iter().all(|count| numbers().flatten() == Some(count))
+    HEAD[..6].iter().all(|&count| numbers().flatten() == Some(count))
+}
+
+/// False if these bytes of a file, whose last line may be cut off, begin no scan: a look at as many
+/// lines as tell it.
+pub(super) fn may_begin_scan(held: &[u8]) -> bool {
+    let is_end = |b: &u8| matches!(b, b'\n' | b'\r');
+    let whole = held.split_inclusive(is_end).take_while(|line| line.last().is_some_and(is_end));
+    let mut lines = whole.filter(|line| !line.trim_ascii().is_empty()).zip(HEAD);
+    lines.all(|(line, count)| Delimiter::Blanks.numbers(line) == Some(count))
 }
 
 /// Reads the first lines of scans.
