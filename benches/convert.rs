@@ -217,6 +217,24 @@ fn steps(las: &Path) -> [String; 2] {
         .map(|(name, at)| format!("--{name}={},{},{}", axis(at), axis(at + 8), axis(at + 16)))
 }
 
+/// Reprojection of the scan that is made here, which lies in Germany: on one datum, and by an
+/// operation between two.
+const REPROJECTED: [(&str, &str); 2] = [("one datum", "EPSG:25833"), ("two datums", "EPSG:31467")];
+
+/// The jobs that reproject `scan`.
+fn reprojecting(folder: &Path, scan: &Path, program: &Path) -> impl Iterator<Item = Job> {
+    REPROJECTED.into_iter().map(move |(name, to)| {
+        let output = folder.join("reprojected.laz");
+        let more = ["--crs", "EPSG:25832", "--reproject", to].map(str::to_owned);
+        Job {
+            command: convert(program, scan, &output, &more),
+            output: Some(output),
+            bounds: vec![0, 1],
+            ..Job::new(format!("laz → laz, {name}"), program, &[])
+        }
+    })
+}
+
 /// All jobs on the files `scan.*` of `folder`.
 fn jobs(folder: &Path, scan: &Path, programs: &[PathBuf]) -> Vec<Job> {
     let own = std::env::current_exe().unwrap();
@@ -316,6 +334,9 @@ fn main() {
     let mut programs = vec![program];
     programs.extend(arguments.get(1).cloned());
     let mut jobs = jobs(folder, &scan, &programs);
+    if arguments.is_empty() {
+        jobs.extend(reprojecting(folder, &scan, &programs[0]));
+    }
     // In turn, so that a machine that slows down slows all of them.
     for _ in 0..ROUNDS {
         for job in &mut jobs {

@@ -9,6 +9,8 @@ use crate::stage::{Role, RoleName, StageKind, StagePlace};
 /// Takes from several sources, which it names in `from`, and does nothing else: stages behind it
 /// need not name them all. A stage whose own `from` is a list merges just the same. The records of
 /// all come in the order in which the sources stand in the pipeline, whatever the order of `from`.
+/// Sources that read files are merged if they read them in one way: all keys of `read` but `path`
+/// and `format` are the same.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Merge {}

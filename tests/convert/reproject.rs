@@ -100,6 +100,10 @@ fn degrees_have_steps_that_are_no_longer_on_the_ground() {
     let far = ["in.las", "-o", "c.las", "--reproject", "EPSG:4258", "--scale", "1e-10,1e-10,0.01"];
     let far = [&["convert"], &far[..], &["--offset", "0,0,0"]].concat();
     fails(at, &far, 1, &["in.las", "too far from the offset", "--scale", "--offset"]);
+    // One number is that of all axes, and each has an offset from which it reaches.
+    let (scale, first) = run("e.las", &["--scale", "1e-7"]);
+    assert_eq!(scale, json!([1e-7, 1e-7, 1e-7]));
+    near(&first, &[DEGREES[0], DEGREES[1], 520.12], 1.1e-7);
     // A step of a map is none of degrees.
     let run = ["in.las", "-o", "d.las", "--reproject", "EPSG:4258", "--scale", "0.001"];
     let (code, _, told) = pointmill(at, &[&["convert"], &run[..]].concat());
@@ -147,13 +151,16 @@ fn heights_change_their_unit_and_nothing_else() {
     done(at, &run("EPSG:2277+6360", "EPSG:26914+5703"));
     let wanted = [616_567.191_618_491, 3_348_982.452_381_561, 304.800_609_601_219];
     near(&rows(at, "out.csv")[0], &wanted, 1e-5);
-    let unit = ["the unit of heights is not named", "EPSG:2277+6360"];
+    let unit = ["the unit of heights is", "EPSG:2277+6360"];
     fails(at, &run("EPSG:2277", "EPSG:26914"), 2, &unit);
     fails(at, &run("EPSG:2277+6360", "EPSG:26914+3855"), 2, &["a grid", "keeps those"]);
     fails(at, &run("EPSG:2277+6360", "EPSG:4979"), 2, &["a grid"]);
     fails(at, &run("EPSG:26914", "EPSG:26914+5703"), 2, &["do not say which heights"]);
+    let ellipsoid = ["the unit of heights", "in metres, or in degrees"];
+    std::fs::write(at.join("in.xyz"), "-98 30.5 100\n").unwrap();
+    fails(at, &run("EPSG:4979", "EPSG:2277"), 2, &ellipsoid);
     // Nothing would say that heights are metres still.
-    fails(at, &run("EPSG:26914", "EPSG:2277"), 2, &["the unit of heights is not named"]);
+    fails(at, &run("EPSG:26914", "EPSG:2277"), 2, &["the unit of heights is"]);
 }
 
 #[test]
@@ -284,6 +291,16 @@ fn a_box_that_is_wrong_misleads_nobody() {
     }
     assert_eq!(rows(at, "a.las"), rows(at, "b.las"));
     assert_eq!(info(at, "b.las")["scale"], json!([0.001, 0.001, 0.001]));
+    // Beside a right one, in either order.
+    let both = |first: &str, second: &str| {
+        let run = ["convert", first, second, "-o", "ab.las", "--reproject", "EPSG:31468"];
+        done(at, &[&run[..], &["--headers", "warn", "--quiet"]].concat());
+        let mut points = rows(at, "ab.las");
+        points.sort_by(|a, b| a.partial_cmp(b).unwrap());
+        (info(at, "ab.las")["scale"].clone(), points)
+    };
+    let one = both("in.las", "odd.las");
+    assert_eq!((&one.0, &one), (&json!([0.001, 0.001, 0.001]), &both("odd.las", "in.las")));
 }
 
 #[test]

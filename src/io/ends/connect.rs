@@ -84,7 +84,7 @@ impl OpenSource for InputFiles {
 }
 
 /// What `open` opens, in the system `to`. Scale and offset are those of the points there: inputs
-/// that differ in them are read as one by steps that round nothing.
+/// that differ in them are read as one by steps that round nothing, where there are such.
 #[cfg(feature = "proj")]
 fn reprojected(
     to: &str,
@@ -92,8 +92,17 @@ fn reprojected(
     open: impl Fn(&ReadKeys) -> Result<Box<dyn Source>>,
 ) -> Result<Box<dyn Source>> {
     let asked = AskedSteps { scale: keys.scale, offset: keys.offset };
-    let (scale, offset) = (Some(Setting::Auto), Some(Setting::Auto));
-    reproject::reprojected(open(&ReadKeys { scale, offset, ..keys.clone() })?, to, asked)
+    let stepped = |steps: Option<Setting<[f64; 3]>>| {
+        open(&ReadKeys { scale: steps, offset: steps, ..keys.clone() })
+    };
+    let inner = match (stepped(None), keys.scale.or(keys.offset)) {
+        (Ok(inner), _) => Ok(inner),
+        // What is asked for is not about these; what they say of each other is.
+        (Err(_), Some(_)) => stepped(Some(Setting::Auto))
+            .map_err(|error| error.help("bring each to one scale and offset by itself first")),
+        (Err(error), None) => stepped(Some(Setting::Auto)).map_err(|_| error),
+    };
+    reproject::reprojected(inner?, to, asked)
 }
 
 #[cfg(not(feature = "proj"))]

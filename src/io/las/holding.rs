@@ -47,7 +47,9 @@ pub fn las_schema(from: &Schema, drop: &[String]) -> Result<(u8, Vec<(String, Sc
     let any = |names: &[&str]| names.iter().any(|name| has(name));
     let (color, wave) = (any(&COLOR), any(&WAVE));
     let whole_degrees = has(n::SCAN_ANGLE)
-        && from.find(n::SCAN_ANGLE).is_some_and(|angle| !angle.scalar.is_float())
+        && from
+            .find(n::SCAN_ANGLE)
+            .is_some_and(|angle| !angle.scalar.is_float() && angle.scale == 1.0)
         && !any(&[n::NIR, n::OVERLAP, n::SCANNER_CHANNEL]);
     let format = match (whole_degrees, wave, color, has(n::GPS_TIME)) {
         (true, true, true, _) => 5,

@@ -279,6 +279,10 @@ impl Source for LasSource {
     fn claimed_box(&self) -> Option<[[f64; 3]; 2]> {
         let filled = self.files.iter().filter(|file| file.input.points() > 0);
         let all = filled.map(|file| file.input.header.bounds());
+        // A box of zeros is one that its writer left as it was: of its points nothing is claimed.
+        if all.clone().any(|corners| corners == [[0.0; 3]; 2]) {
+            return None;
+        }
         let all = all.reduce(|[lo, hi], [other_lo, other_hi]| {
             let each = |of: fn(f64, f64) -> f64, a: [f64; 3], b: [f64; 3]| {
                 [of(a[0], b[0]), of(a[1], b[1]), of(a[2], b[2])]

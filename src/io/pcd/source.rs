@@ -103,7 +103,11 @@ fn metadata(files: &[PcdFile], said: Said, crs: Option<String>) -> Metadata {
             names.entry(dimension).or_insert_with(|| field.name.clone());
         }
     }
-    let PcdHeader { data, viewpoint, .. } = files[0].header;
+    // What not all have is not said of all: the order of inputs plays no part.
+    let PcdHeader { data: first, viewpoint: stood, .. } = files[0].header;
+    let is_one = files.iter().all(|file| file.header.data == first);
+    let data = if is_one { first } else { PcdData::Binary };
+    let viewpoint = stood.filter(|_| files.iter().all(|f| f.header.viewpoint == stood));
     let native = PcdNative { names: names.into_iter().collect(), data, viewpoint };
     Metadata {
         units: crs.as_deref().map(crate::io::wkt::units).unwrap_or_default(),

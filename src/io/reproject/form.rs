@@ -4,6 +4,7 @@
 //! than a step of the inputs on the ground. Others become `f64`: metres of a map have more digits
 //! than the `f32` of a scanner.
 
+use super::systems::HeightChange;
 use crate::io::convert::Projection;
 use crate::io::steps::{REACH, reaches};
 use crate::point::names::XYZ;
@@ -11,6 +12,9 @@ use crate::point::{Dimension, PointBatch, Scalar, Schema, Value};
 use crate::quantity::{Figure, Setting};
 use crate::report::Short;
 use crate::{Error, Result};
+
+/// Heights that are those of the inputs.
+const KEPT: HeightChange = HeightChange::Times(1.0);
 
 /// How records of the inputs become reprojected ones, but for their coordinates.
 #[derive(Debug, Clone)]
@@ -22,8 +26,7 @@ pub struct ReprojectedForm {
     fields: Option<Projection>,
     axes: [Dimension; 3],
     own_axes: [Dimension; 3],
-    /// True if heights are those of the inputs.
-    keeps_heights: bool,
+    heights: HeightChange,
 }
 
 /// What the keys of `read` say of the scale and the offset of reprojected coordinates.
@@ -43,7 +46,7 @@ impl ReprojectedForm {
         asked: AskedSteps,
         metres: AxisMetres,
         place: Option<[[f64; 3]; 2]>,
-        keeps_heights: bool,
+        heights: HeightChange,
     ) -> Result<ReprojectedForm> {
         let [own_axes, mut axes] = [axes_of(own)?, axes_of(own)?];
         let mut schema = own.clone();
@@ -53,14 +56,11 @@ impl ReprojectedForm {
                 let given = |key: Option<Setting<[f64; 3]>>| Some(key?.given()?[n]);
                 let asked = [given(asked.scale), given(asked.offset)];
                 let place = place.map(|[lo, hi]| [lo[n], hi[n]]);
-                if n == 2 && keeps_heights {
-                    axis.scale = asked[0].unwrap_or(axis.scale);
-                    axis.origin = asked[1].unwrap_or(axis.origin);
-                } else {
-                    let ground = metres.map(|metres| metres[n]);
+                let ground = metres.map(|metres| metres[n]);
+                if !(n == 2 && heights == KEPT && asked == [None; 2]) {
                     (axis.scale, axis.origin) = steps(&own_axes[n], ground, asked, place)?;
                 }
-                coarser.extend(told_coarser(&own_axes[n], axis, metres.map(|metres| metres[n])));
+                coarser.extend(told_coarser(&own_axes[n], axis, ground, asked[0].is_some()));
                 for field in schema.dimensions.iter_mut().filter(|field| field.name == axis.name) {
                     (field.scale, field.origin) = (axis.scale, axis.origin);
                 }
@@ -73,7 +73,7 @@ impl ReprojectedForm {
             true => None,
             false => Some(Projection::reading(own, &schema)?),
         };
-        Ok(ReprojectedForm { schema, coarser, fields, axes, own_axes, keeps_heights })
+        Ok(ReprojectedForm { schema, coarser, fields, axes, own_axes, heights })
     }
 
     /// Refills `records` from those of `own`; `apply` has the place of each. A point without x or y
@@ -90,19 +90,19 @@ impl ReprojectedForm {
         }
         let (from, to) = (own.schema().endian, self.schema.endian);
         let [own_z, z] = [&self.own_axes[2], &self.axes[2]];
-        let is_z_there = self.keeps_heights
+        let is_z_there = self.heights == KEPT
             && (own_z.scalar, own_z.scale, own_z.origin) == (z.scalar, z.scale, z.origin);
         let changed = if is_z_there { 2 } else { 3 };
         for (old, new) in own.iter().zip(records.chunks_exact_mut(self.schema.stride)) {
             let [x, y, z] = [0, 1, 2].map(|axis: usize| self.own_axes[axis].world(old, from));
-            let has_place = x.is_finite() && y.is_finite();
-            let has_place = has_place && (z.is_finite() || self.keeps_heights);
+            let needs_z = self.heights == HeightChange::WithPlace;
+            let has_place = x.is_finite() && y.is_finite() && (z.is_finite() || !needs_z);
             let mut found = [f64::NAN; 3];
             if has_place {
                 let place = [x, y, if z.is_finite() { z } else { 0.0 }];
                 found = apply(place).map_err(|why| BadPoint::unplaced(place, &why))?;
             }
-            if self.keeps_heights || !z.is_finite() {
+            if self.heights == KEPT || !z.is_finite() {
                 found[2] = z;
             }
             for (axis, found) in self.axes.iter().zip(found).take(changed) {
@@ -171,7 +171,7 @@ fn steps(
     place: Option<[f64; 2]>,
 ) -> Result<(f64, f64)> {
     let found = power_of_ten(own.scale.abs() * own_metres / metres);
-    if !(found > 0.0 && found.is_finite()) {
+    if asked[0].is_none() && !(found > 0.0 && found.is_finite()) {
         let told = format!("the scale {:e} of the inputs is no length that can be kept", own.scale);
         return Err(Error::pipeline(told).help("give `read.scale`"));
     }
@@ -183,12 +183,21 @@ fn steps(
 }
 
 /// What is to be told of an axis whose steps are longer on the ground than they were.
-fn told_coarser(own: &Dimension, axis: &Dimension, [was, is]: [f64; 2]) -> Option<String> {
+fn told_coarser(
+    own: &Dimension,
+    axis: &Dimension,
+    [was, is]: [f64; 2],
+    is_asked: bool,
+) -> Option<String> {
     let [before, after] = [own.scale.abs() * was, axis.scale.abs() * is];
+    let why = match is_asked {
+        true => "`read.scale` asks for it",
+        false => "shorter ones do not reach from end to end of the scan",
+    };
     (after > before * (1.0 + 1e-6)).then(|| {
         format!(
-            "{} is rounded to steps of {}, which are {} m on the ground; those of the inputs are \
-             {} m: `read.scale` makes them shorter",
+            "{} is rounded to steps of {}, which are {} m on the ground, and those of the inputs \
+             are {} m: {why}",
             axis.name.to_ascii_lowercase(),
             Figure(axis.scale),
             Short(after),

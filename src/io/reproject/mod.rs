@@ -40,13 +40,12 @@ pub fn reprojected(inner: Box<dyn Source>, to: &str, asked: AskedSteps) -> Resul
     let is_needed = !from.has_datum_of(&to) || has_steps(inner.schema());
     let place = if is_needed { place_of(&*inner)? } else { None };
     let corners = place.map(|place| place.corners);
-    let up = metadata.units.vertical.unwrap_or(1.0);
+    let up = from.height_unit(metadata.units.vertical);
     let (transform, told) = PointTransform::between(&from, &to, (heights.change, up), corners)?;
     let image = corners.and_then(|corners| image(&transform, corners));
     let [was, is] = [from.metres(), to.metres()];
     let metres = [[was, was, up], [is, is, up / heights.change.factor()]];
-    let keeps = transform.keeps_heights();
-    let form = ReprojectedForm::of(inner.schema(), asked, metres, image, keeps)?;
+    let form = ReprojectedForm::of(inner.schema(), asked, metres, image, heights.change)?;
     let are_degrees = [&from, &to].map(PlacedSystem::is_in_degrees);
     let (notes, crs) = (heights.told, to.text());
     let how = HowReprojected { transform, form, told, notes, are_degrees, place, image, crs };

@@ -87,9 +87,9 @@ impl PointTransform {
         Ok([found.x, found.y, if factor == 1.0 { z } else { z * factor }])
     }
 
-    /// True if z stays as it is.
-    pub fn keeps_heights(&self) -> bool {
-        self.heights == HeightChange::Times(1.0)
+    /// What becomes of heights.
+    pub fn heights(&self) -> HeightChange {
+        self.heights
     }
 }
 

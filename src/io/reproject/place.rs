@@ -1,15 +1,20 @@
 //! Where a scan is, before and after it is reprojected.
 
 use super::operation::PointTransform;
+use super::systems::HeightChange;
 use crate::Result;
 use crate::point::PointBatch;
 use crate::point::names::XYZ;
 use crate::stage::{BATCH, Source};
 
-/// Parts of which the first points are held against the box that headers claim.
-const LOOKS: usize = 16;
-/// Bytes of records that are looked at at once, at most.
-const LOOK_BYTES: usize = 1 << 20;
+/// Parts of which the first points are held against the box that headers claim, and how many.
+const LOOKS: usize = 4096;
+const LOOK_POINTS: usize = 64;
+/// Bytes of records that are read at once, at most.
+const READ_BYTES: usize = 1 << 20;
+/// How far a point may lie outside of what a header claims, in steps: some writers take the box
+/// before they round.
+const SLACK: f64 = 1.0;
 /// Steps along an edge of a box whose image is looked for.
 const ALONG: usize = 32;
 /// What is added to an image on each side, in parts of its length: it bulges between the points.
@@ -37,7 +42,13 @@ pub fn place_of(source: &dyn Source) -> Result<Option<ScanPlace>> {
         for look in 0..parts.min(LOOKS) {
             widen(source, look * parts / parts.min(LOOKS), false, &mut found)?;
         }
-        let is_in = |axis: usize| found[0][axis] >= lo[axis] && found[1][axis] <= hi[axis];
+        let slack = source.schema().coordinates().map_or([0.0; 3], |axes| {
+            [0, 1, 2].map(|n: usize| {
+                let largest = lo[n].abs().max(hi[n].abs());
+                SLACK * axes[n].scale.abs() + 4.0 * f64::EPSILON * largest
+            })
+        });
+        let is_in = |n: usize| found[0][n] >= lo[n] - slack[n] && found[1][n] <= hi[n] + slack[n];
         if (0..3).all(is_in) {
             return Ok(Some(ScanPlace { corners, is_claimed: true }));
         }
@@ -58,13 +69,18 @@ fn widen(source: &dyn Source, part: usize, all: bool, corners: &mut [[f64; 3]; 2
     let Some(axes) = schema.coordinates() else { return Ok(()) };
     let names = schema.dimensions.iter().map(|dimension| dimension.name.clone());
     let unread: Vec<String> = names.filter(|name| !XYZ.contains(&name.as_str())).collect();
-    let points = (LOOK_BYTES / schema.stride.max(1)).clamp(1, BATCH);
+    let most = if all { BATCH } else { LOOK_POINTS };
+    let points = (READ_BYTES / schema.stride.max(1)).clamp(1, most);
     let mut batch = PointBatch::new(schema.clone(), points);
     let mut reader = source.part_without(part, &unread)?;
     loop {
         reader.read(&mut batch)?;
         for record in batch.iter() {
-            let at = axes.map(|axis| axis.world(record, schema.endian));
+            let mut at = axes.map(|axis| axis.world(record, schema.endian));
+            // A point without z is somewhere all the same.
+            if !at[2].is_finite() {
+                at[2] = 0.0;
+            }
             if !at.iter().all(|at| at.is_finite()) {
                 continue;
             }
@@ -91,7 +107,7 @@ pub fn image(transform: &PointTransform, [lo, hi]: [[f64; 3]; 2]) -> Option<[[f6
             (low[axis], high[axis]) = (low[axis].min(image), high[axis].max(image));
         }
     }
-    let changed = if transform.keeps_heights() { 2 } else { 3 };
+    let changed = if transform.heights() == HeightChange::Times(1.0) { 2 } else { 3 };
     for (low, high) in low.iter_mut().zip(&mut high).take(changed) {
         let more = (*high - *low) * BULGE;
         (*low, *high) = (*low - more, *high + more);

@@ -9,6 +9,7 @@ use proj_core::{AxisOrder, CrsDef, lookup_epsg, registry};
 use crate::io::meaning::SystemMeaning;
 use crate::io::{epsg, wkt};
 use crate::point::{Horizontal, Units};
+use crate::quantity::Figure;
 use crate::{Error, Result};
 
 /// A system of x and y, and that of heights where it is named.
@@ -96,7 +97,7 @@ impl PlacedSystem {
     }
 
     /// Metres in a unit of heights that are not named, as everybody takes it: that of x and y.
-    fn height_unit(&self, said: Option<f64>) -> f64 {
+    pub fn height_unit(&self, said: Option<f64>) -> f64 {
         said.unwrap_or(if self.definition.is_projected() { self.metres() } else { 1.0 })
     }
 
@@ -172,7 +173,7 @@ pub fn heights(from: &PlacedSystem, to: &PlacedSystem, units: &Units) -> Result<
     let is_coded = from.up.is_some() || to.up.is_some();
     if to.has_place_heights() || from.definition.is_geocentric() {
         return match from.has_place_heights() && !is_coded {
-            true => with_place(from, to),
+            true => with_place(from, to, units).map_err(|told| refuse(&told).help(NAME_HEIGHTS)),
             false if is_coded => Err(refuse(NEEDS_GEOID).help(KEEP)),
             false => Err(refuse(
                 "heights above the ellipsoid are needed, and those of the inputs are not named",
@@ -193,14 +194,13 @@ pub fn heights(from: &PlacedSystem, to: &PlacedSystem, units: &Units) -> Result<
         (None, Some(_)) => Err(refuse("the inputs do not say which heights they have")
             .help("`read.crs` says it, as `EPSG:25832+7837`; or reproject x and y alone")),
         (Some(up), None) => times(1.0, Some(up)),
-        (None, None) if from.has_place_heights() => with_place(from, to),
+        (None, None) if from.has_place_heights() => {
+            with_place(from, to, units).map_err(|told| refuse(&told).help(NAME_HEIGHTS))
+        }
         (None, None) if from.height_unit(units.vertical) == to.height_unit(None) => {
             times(1.0, None)
         }
-        (None, None) => Err(refuse(
-            "the unit of heights is not named, and x and y are in another unit behind",
-        )
-        .help(format!(
+        (None, None) => Err(refuse(&other_unit(from, to, units)).help(format!(
             "`read.crs` says which heights the inputs have: `EPSG:{}+6360` are heights in US \
              survey feet, `EPSG:{}+5703` in metres, both of NAVD88",
             from.code, from.code
@@ -208,8 +208,26 @@ pub fn heights(from: &PlacedSystem, to: &PlacedSystem, units: &Units) -> Result<
     }
 }
 
-/// Heights above an ellipsoid, of which the system behind may say nothing.
-fn with_place(from: &PlacedSystem, to: &PlacedSystem) -> Result<NewHeights> {
+/// What is wrong where heights would be taken to be in another unit than they are.
+fn other_unit(from: &PlacedSystem, to: &PlacedSystem, units: &Units) -> String {
+    let [own, taken] = [from.height_unit(units.vertical), to.height_unit(None)];
+    format!(
+        "the unit of heights is {} m, nothing names it behind, and everybody would take it for {} m",
+        Figure(own),
+        Figure(taken)
+    )
+}
+
+/// Heights above an ellipsoid, of which the system behind may say nothing; what is wrong if it
+/// would have them in another unit.
+fn with_place(
+    from: &PlacedSystem,
+    to: &PlacedSystem,
+    units: &Units,
+) -> std::result::Result<NewHeights, String> {
+    if !to.has_place_heights() && from.height_unit(units.vertical) != to.height_unit(None) {
+        return Err(other_unit(from, to, units));
+    }
     let change = match to.has_place_heights() {
         true => HeightChange::WithPlace,
         false if from.definition.is_geocentric() => HeightChange::WithPlace,
@@ -220,5 +238,6 @@ fn with_place(from: &PlacedSystem, to: &PlacedSystem) -> Result<NewHeights> {
     Ok(NewHeights { change, up: None, told })
 }
 
+const NAME_HEIGHTS: &str = "reproject to a system in metres, or in degrees";
 const NEEDS_GEOID: &str = "heights of the two differ by a grid that pointmill does not have";
 const KEEP: &str = "name no heights for the output, which keeps those of the inputs";

@@ -1,6 +1,7 @@
 use std::sync::Arc;
 
 use super::form::{AskedSteps, AxisMetres, ReprojectedForm};
+use super::systems::HeightChange;
 use crate::point::{Dimension, Endian, Layout, PointBatch, Scalar, Schema, Value};
 use crate::quantity::Setting;
 
@@ -19,7 +20,11 @@ fn records(scalar: Scalar, steps: bool, scale: f64) -> Schema {
 const HERE: [[f64; 3]; 2] = [[244_000.0, 5_337_000.0, 0.0], [245_000.0, 5_338_000.0, 10.0]];
 
 fn form(own: &Schema, asked: AskedSteps, metres: AxisMetres, keeps: bool) -> ReprojectedForm {
-    ReprojectedForm::of(own, asked, metres, Some(HERE), keeps).unwrap()
+    ReprojectedForm::of(own, asked, metres, Some(HERE), heights(keeps)).unwrap()
+}
+
+fn heights(keeps: bool) -> HeightChange {
+    if keeps { HeightChange::Times(1.0) } else { HeightChange::WithPlace }
 }
 
 /// Scale and offset of each axis.
@@ -67,7 +72,8 @@ fn steps_of_no_length_are_refused() {
         let own = records(Scalar::I32, true, scale);
         let metres = [[111_319.5; 3], [1e-3; 3]];
         let place = if scale < 1.0 { [metres[1], metres[0]] } else { metres };
-        let made = ReprojectedForm::of(&own, AskedSteps::default(), place, Some(HERE), false);
+        let made =
+            ReprojectedForm::of(&own, AskedSteps::default(), place, Some(HERE), heights(false));
         assert!(made.unwrap_err().to_string().contains("no length"), "{scale}");
     }
 }
