@@ -212,7 +212,7 @@ pub fn heights(from: &PlacedSystem, to: &PlacedSystem, units: &Units) -> Result<
 fn other_unit(from: &PlacedSystem, to: &PlacedSystem, units: &Units) -> String {
     let [own, taken] = [from.height_unit(units.vertical), to.height_unit(None)];
     format!(
-        "the unit of heights is {} m, nothing names it behind, and everybody would take it for {} m",
+        "the unit of heights is {} m, and nothing behind says that it is not {} m",
         Figure(own),
         Figure(taken)
     )
