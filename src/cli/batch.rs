@@ -183,7 +183,7 @@ impl BatchDone {
     }
 
     /// The error in the end, of the first failure's kind, rather than that a result is not
-    /// accepted; it names the inputs.
+    /// accepted, or that the pipeline is wrong for some of the files; it names the inputs.
     pub fn outcome(self) -> Result<()> {
         if self.left() > 0 {
             return Err(Error::interrupted());
@@ -208,7 +208,12 @@ impl BatchDone {
         if failed > NAMED {
             names += &format!(" and {} more", failed - NAMED);
         }
-        Err(Error::new(worst.kind(), format!("{failed} of {all} conversions failed: {names}")))
+        // What is wrong for some files of several is not the command.
+        let kind = match worst.kind() {
+            ErrorKind::Pipeline if failed < all => ErrorKind::Data,
+            kind => kind,
+        };
+        Err(Error::new(kind, format!("{failed} of {all} conversions failed: {names}")))
     }
 
     /// The closing table.

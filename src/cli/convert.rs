@@ -9,7 +9,8 @@ use serde_json::{Value, json};
 use super::arguments::{BulkArguments, ConvertArguments};
 use super::batch::{BatchRun, BatchWork, jobs_for, run_all, threads_of};
 use super::console::Console;
-use super::flags::{common_flags, convert_flags, given, one_form};
+use super::flags::{common_flags, convert_flags, given};
+use super::form::{one_form, without_form};
 use super::mistyped::marked;
 use super::pipeline::{HIDDEN, with_stages};
 use super::run::{finish, mill};
@@ -169,11 +170,11 @@ fn pipeline(
     output: Value,
     registry: &Registry,
 ) -> Result<Graph> {
-    let sets = given([
-        convert_flags(arguments, Some(inputs.clone()), Some(output)),
-        one_form(&paths(&inputs), &arguments.read, &arguments.written, registry),
-        common_flags(&arguments.common),
-    ]);
+    let form = one_form(&paths(&inputs), &arguments.read, &arguments.written, registry);
+    let named = (output.as_str().unwrap_or_default().to_owned(), arguments.to.as_deref());
+    let all = convert_flags(arguments, Some(inputs), Some(output));
+    let all = without_form(all, &form, (&named.0, named.1), registry);
+    let sets = given([all, form, common_flags(&arguments.common)]);
     let filter = arguments.filter.is_given().then_some("filter");
     Graph::parse_with(&with_stages(CONVERT, filter.into_iter()), HIDDEN, registry, &sets)
 }

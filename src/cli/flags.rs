@@ -1,8 +1,6 @@
 //! Flags and the settings that they stand for, in one table a command. Pipelines take their values
 //! from it, and messages their words.
 
-use std::path::PathBuf;
-
 use serde_json::{Value, json};
 
 use super::arguments::{
@@ -10,8 +8,7 @@ use super::arguments::{
     ReadArguments, ReduceArguments, SynthArguments, VerifyArguments, WrittenArguments,
 };
 use super::classes::Classes;
-use crate::io::ends::expand;
-use crate::language::{Registry, Set};
+use crate::language::Set;
 use crate::ops::KEEP_RANK;
 use crate::quantity::{Length, parse_count};
 use crate::report::ACCEPT_RULES;
@@ -47,7 +44,7 @@ impl<T: Into<Value>> From<T> for FlagValue {
 }
 
 /// Flags from `(name, address, what was given)`.
-fn flags<const N: usize>(
+pub(super) fn flags<const N: usize>(
     rows: [(&'static str, &'static str, Option<FlagValue>); N],
 ) -> Vec<CommandFlag> {
     rows.into_iter().map(|(name, address, given)| CommandFlag { name, address, given }).collect()
@@ -278,44 +275,6 @@ fn read(arguments: &ReadArguments) -> Vec<CommandFlag> {
     ])
 }
 
-/// [`united`] where `inputs` are several LAS files, or LAS files whose coordinates become others;
-/// other inputs are not brought to such a form.
-pub(super) fn one_form(
-    inputs: &[String],
-    read: &ReadArguments,
-    arguments: &WrittenArguments,
-    registry: &Registry,
-) -> Vec<CommandFlag> {
-    let form = united(arguments);
-    if form.iter().all(|flag| flag.given.is_none()) {
-        return form;
-    }
-    let formats = registry.formats();
-    let named =
-        read.from.as_deref().and_then(|name| formats.iter().find(|format| format.name() == name));
-    let has_scale = |file: &PathBuf| {
-        let format = named.or_else(|| formats.of(file));
-        format.is_some_and(|format| format.read_keys().contains(&"scale"))
-    };
-    // What is wrong with the names, the run tells.
-    let files = expand(inputs, formats).unwrap_or_default();
-    let is_wanted = files.len() > 1 || read.reproject.is_some();
-    match is_wanted && files.iter().all(has_scale) {
-        true => form,
-        false => Vec::new(),
-    }
-}
-
-/// The one form that several LAS inputs are brought to, as keys of `read`: that of the output.
-pub(super) fn united(arguments: &WrittenArguments) -> Vec<CommandFlag> {
-    let format = arguments.point_format.as_deref();
-    flags([
-        ("--scale", "read.scale", arguments.scale.as_deref().map(numbers_or_text)),
-        ("--offset", "read.offset", arguments.offset.as_deref().map(numbers_or_text)),
-        ("--point-format", "read.point_format", format.map(whole_or_text)),
-    ])
-}
-
 /// How the output is written, as the keys of `write`.
 fn written(arguments: &WrittenArguments) -> Vec<CommandFlag> {
     let list = |given: &[String]| (!given.is_empty()).then(|| json!(given).into());
@@ -348,7 +307,7 @@ fn classes(given: &[Classes]) -> Option<FlagValue> {
 }
 
 /// A whole number where the text is one (`10k`, `1e1`), else a number or the text.
-fn whole_or_text(text: &str) -> FlagValue {
+pub(super) fn whole_or_text(text: &str) -> FlagValue {
     match parse_count(text) {
         Ok(count) => FlagValue::of(text, count.into()),
         // As a float it would be told in other digits than were typed.
@@ -370,7 +329,7 @@ fn number_or_text(text: &str) -> FlagValue {
 
 /// A list of numbers where the text has commas (what is no number there is told), else a number or
 /// the text (`x`).
-fn numbers_or_text(text: &str) -> FlagValue {
+pub(super) fn numbers_or_text(text: &str) -> FlagValue {
     let list = || text.split(',').map(plain).collect();
     FlagValue::of(text, if text.contains(',') { list() } else { plain(text) })
 }

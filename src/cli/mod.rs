@@ -18,6 +18,7 @@ mod events;
 mod exit;
 mod explain;
 mod flags;
+mod form;
 mod graph;
 mod groups;
 mod help;

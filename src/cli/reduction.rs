@@ -1,7 +1,8 @@
 //! The pipeline of `reduce`: one of two that users copy, with values of arguments.
 
 use super::arguments::ReduceArguments;
-use super::flags::{common_flags, given, one_form, reduce_flags};
+use super::flags::{common_flags, given, reduce_flags};
+use super::form::one_form;
 use super::pipeline::{HIDDEN, with_stages};
 use super::preset::Preset;
 use crate::Result;

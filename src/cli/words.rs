@@ -3,9 +3,10 @@
 
 use super::arguments::Command;
 use super::flags::{
-    common_flags, compare_flags, convert_flags, cut_flags, reduce_flags, synth_flags, united,
-    verify_flags, walk_flags,
+    common_flags, compare_flags, convert_flags, cut_flags, reduce_flags, synth_flags, verify_flags,
+    walk_flags,
 };
+use super::form::united;
 use crate::Error;
 use crate::language::Registry;
 

@@ -46,6 +46,15 @@ pub fn codes(text: &str) -> Option<(u32, Option<u32>)> {
     }
 }
 
+/// The code of the system of x and y in WKT, whatever is said of heights.
+#[cfg(feature = "proj")]
+pub fn horizontal_code(text: &str) -> Option<u32> {
+    let trees = parse(text)?;
+    let mut across = parts(&trees).into_iter().filter(|part| !part.is(&VERTICAL));
+    let code = across.next()?.epsg()?;
+    across.next().is_none().then_some(code)
+}
+
 fn codes_of_parts(trees: &[WktNode]) -> Option<(u32, Option<u32>)> {
     let (mut across, mut up) = (None, None);
     for part in parts(trees) {

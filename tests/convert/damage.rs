@@ -65,6 +65,8 @@ fn a_damaged_chunk_costs_its_points_or_those_behind_the_damage() {
     let (told, records, all) = run(at, "bad.laz", "salvage");
     let kept = POINTS - lost(&all) as usize;
     assert!(told.contains("points are lost: chunk 2"), "{told}");
+    // Damage that shows in one field may have changed it long before.
+    assert!(told.contains("which are kept, values may be wrong"), "{told}");
     assert!(kept > POINTS - CHUNK && kept < POINTS, "{kept}");
     assert_eq!(records.len(), kept * schema.stride);
     assert!(records[..chunk] == whole[..chunk]);

@@ -322,3 +322,19 @@ fn values_that_no_format_without_times_holds_go_together_by_way_of_ply() {
         assert_eq!(all.len(), 3);
     }
 }
+
+#[test]
+fn inputs_that_differ_become_one_that_is_not_las_or_has_less() {
+    let at = inputs(&["23a.las", "23f.las"]);
+    let at = at.path();
+    let run = |out: &str, more: &[&str]| {
+        done(at, &[&["convert", "23a.las", "23f.las", "-o", out, "--quiet"], more].concat());
+        text(at, out)
+    };
+    let ply = run("o.ply", &["--point-format", "3"]);
+    assert_eq!(ply.lines().count(), 11);
+    // What the smaller format lacks is dropped from what has the fields of both.
+    let less = run("o.las", &["--point-format", "0", "--drop", "GpsTime,Red,Green,Blue"]);
+    assert_eq!((less.lines().count(), less.contains("GpsTime")), (11, false));
+    assert_eq!(info(at, "o.las")["point_format"], 0);
+}

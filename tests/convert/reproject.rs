@@ -156,6 +156,25 @@ fn heights_change_their_unit_and_nothing_else() {
     fails(at, &run("EPSG:2277+6360", "EPSG:26914+3855"), 2, &["a grid", "keeps those"]);
     fails(at, &run("EPSG:2277+6360", "EPSG:4979"), 2, &["a grid"]);
     fails(at, &run("EPSG:26914", "EPSG:26914+5703"), 2, &["do not say which heights"]);
+    // A unit of heights without a system, as GeoTIFF keys have it, is no hindrance.
+    let wkt = "PROJCS[\"a\",GEOGCS[\"NAD83\",DATUM[\"North_American_Datum_1983\",SPHEROID[\
+               \"GRS 1980\",6378137,298.257222101]],PRIMEM[\"Greenwich\",0],UNIT[\"degree\",\
+               0.0174532925199433],AUTHORITY[\"EPSG\",\"4269\"]],UNIT[\"metre\",1],AUTHORITY[\
+               \"EPSG\",\"26914\"]]";
+    let unit = |unit: &str| {
+        let up = format!("VERT_CS[\"unknown\",VERT_DATUM[\"unknown\",2005],UNIT[{unit}]]");
+        let crs = format!("COMPD_CS[\"b\",{wkt},{up}]");
+        ["--crs", &crs, "--reproject", "EPSG:26915", "--quiet"].map(str::to_owned)
+    };
+    std::fs::write(at.join("u.xyz"), "600000 3400000 100\n").unwrap();
+    let make = |unit: &[String]| {
+        let unit: Vec<&str> = unit.iter().map(String::as_str).collect();
+        pointmill(at, &[&["convert", "u.xyz", "-o", "u.csv"], &unit[..]].concat())
+    };
+    let (code, _, told) = make(&unit("\"metre\",1"));
+    assert_eq!(code, 0, "{told}");
+    let (code, _, told) = make(&unit("\"foot\",0.3048"));
+    assert!(code == 2 && told.contains("the unit of heights is 0.3048 m"), "{told}");
     let ellipsoid = ["the unit of heights", "in metres, or in degrees"];
     std::fs::write(at.join("in.xyz"), "-98 30.5 100\n").unwrap();
     fails(at, &run("EPSG:4979", "EPSG:2277"), 2, &ellipsoid);

@@ -50,7 +50,8 @@ use crate::stage::{
 /// taken. A warning names it with its accuracy, and a better one that needs such a file, where
 /// there is one; `run.reprojection` of a report has them, too. Systems between which there is none
 /// without a file are refused, and none are ever treated as one because they are alike. Between
-/// systems on one datum nothing is lost, and nothing is told. Files that are converted one by one
+/// systems on one datum it is exact but for the steps of coordinates, and nothing is told. Nobody
+/// looks whether points lie where a system is meant to be used. Files that are converted one by one
 /// may have an operation each, where they lie in places of several; files that are read as one scan
 /// have one.
 ///

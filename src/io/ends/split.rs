@@ -99,15 +99,18 @@ impl SplitFiles {
         let name = self.name();
         let folder = path.parent().unwrap_or(Path::new(""));
         let places = self.by.places();
-        if places.iter().all(|place| name.matches(place).count() == 1) && pattern(folder).is_none()
-        {
+        // What stands for a split by another key would stay in the names.
+        let rest = places.iter().fold(name.clone(), |rest, place| rest.replace(place, ""));
+        let has_others = [folder, Path::new(&rest)].iter().any(|path| pattern(path).is_some());
+        if places.iter().all(|place| name.matches(place).count() == 1) && !has_others {
             return Ok(());
         }
         let each: Vec<String> = places.iter().map(|place| format!("`{place}`")).collect();
         let [of, stands] = self.by.told();
         let once = if places.len() > 1 { "each once" } else { "once" };
         let told = format!(
-            "`{}` names no file {of}: the name of the file has {}, {once}, where {stands} to stand",
+            "`{}` names no file {of}: the name of the file has {}, {once}, where {stands} to \
+             stand, and nothing else in braces",
             shown(path),
             each.join(" and ")
         );

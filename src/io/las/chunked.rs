@@ -117,6 +117,11 @@ impl LazPart {
     /// Goes on without `points` points of the chunk, if that is wanted, which is taken down; else
     /// fails with `error`.
     fn lose(&self, chunk: Chunk, points: u64, error: Error) -> Result<()> {
+        self.lose_besides(chunk, points, error, "")
+    }
+
+    /// The same, with what is to be told besides.
+    fn lose_besides(&self, chunk: Chunk, points: u64, error: Error, besides: &str) -> Result<()> {
         let evidence = self.evidence.as_ref().filter(|_| self.on_error != OnError::Fail);
         match evidence.filter(|_| error.kind() == ErrorKind::Data) {
             Some(evidence) if points > 0 => {
@@ -124,7 +129,7 @@ impl LazPart {
                     self.file.path(),
                     chunk.start,
                     points,
-                    error.message(),
+                    &format!("{}{besides}", error.message()),
                 ));
             }
             Some(evidence) => evidence.warn(format!("{error}; its points are read all the same")),
@@ -163,7 +168,8 @@ impl LazPart {
         if good == 0 {
             return Err(error);
         }
-        self.lose(chunk, chunk.points - good, error)?;
+        let kept = format!("; of the {good} points before, which are kept, values may be wrong");
+        self.lose_besides(chunk, chunk.points - good, error, &kept)?;
         self.decoder.begin(chunk.start, chunk.end);
         self.is_cut = true;
         let chunk = Chunk { points: good, whole: false, ..chunk };

@@ -38,14 +38,14 @@ impl PlacedSystem {
                         they name none";
             return Err(Error::pipeline(told).help("`read.crs = \"EPSG:25832\"` says it"));
         };
-        let (code, up) = match wkt::codes(text) {
-            Some(codes) => codes,
-            None => by_meaning(text).ok_or_else(|| {
-                let told = "`read.reproject` goes by EPSG codes, and none is known for the \
-                            coordinate reference system of the inputs";
-                Error::pipeline(told).help("`read.crs = \"EPSG:25832\"` says which it is")
-            })?,
-        };
+        let known = wkt::codes(text).or_else(|| by_meaning(text));
+        // A unit alone is a system of heights that has no code; it is among the units all the same.
+        let known = known.or_else(|| Some((wkt::horizontal_code(text)?, None)));
+        let (code, up) = known.ok_or_else(|| {
+            let told = "`read.reproject` goes by EPSG codes, and none is known for the \
+                        coordinate reference system of the inputs";
+            Error::pipeline(told).help("`read.crs = \"EPSG:25832\"` says which it is")
+        })?;
         let own = SystemMeaning::said(text).filter(|_| wkt::is_wkt(text));
         let by_code = SystemMeaning::said(&format!("EPSG:{code}"));
         if own.is_some_and(|own| by_code.is_some_and(|by_code| by_code.contradicts(&own))) {
@@ -212,7 +212,7 @@ pub fn heights(from: &PlacedSystem, to: &PlacedSystem, units: &Units) -> Result<
 fn other_unit(from: &PlacedSystem, to: &PlacedSystem, units: &Units) -> String {
     let [own, taken] = [from.height_unit(units.vertical), to.height_unit(None)];
     format!(
-        "the unit of heights is {} m, and nothing behind says that it is not {} m",
+        "the unit of heights is {} m, and nothing would say afterwards that it is not {} m",
         Figure(own),
         Figure(taken)
     )
