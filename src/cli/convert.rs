@@ -10,7 +10,7 @@ use super::arguments::{BulkArguments, ConvertArguments};
 use super::batch::{BatchRun, BatchWork, jobs_for, run_all, threads_of};
 use super::console::Console;
 use super::flags::{common_flags, convert_flags, given};
-use super::form::{one_form, without_form};
+use super::form::with_form;
 use super::mistyped::marked;
 use super::pipeline::{HIDDEN, with_stages};
 use super::run::{finish, mill};
@@ -170,10 +170,9 @@ fn pipeline(
     output: Value,
     registry: &Registry,
 ) -> Result<Graph> {
-    let form = one_form(&paths(&inputs), &arguments.read, &arguments.written, registry);
-    let named = (output.as_str().unwrap_or_default().to_owned(), arguments.to.as_deref());
+    let (files, ends) = (paths(&inputs), (&arguments.read, &arguments.written));
     let all = convert_flags(arguments, Some(inputs), Some(output));
-    let all = without_form(all, &form, (&named.0, named.1), registry);
+    let [all, form] = with_form(all, &files, ends, registry);
     let sets = given([all, form, common_flags(&arguments.common)]);
     let filter = arguments.filter.is_given().then_some("filter");
     Graph::parse_with(&with_stages(CONVERT, filter.into_iter()), HIDDEN, registry, &sets)

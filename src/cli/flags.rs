@@ -35,6 +35,11 @@ impl FlagValue {
     pub fn of(text: &str, value: Value) -> FlagValue {
         FlagValue { value, typed: Some(text.to_owned()) }
     }
+
+    /// The text that it is, if it is one.
+    pub fn text(&self) -> Option<&str> {
+        self.value.as_str()
+    }
 }
 
 impl<T: Into<Value>> From<T> for FlagValue {

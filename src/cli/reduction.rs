@@ -2,7 +2,7 @@
 
 use super::arguments::ReduceArguments;
 use super::flags::{common_flags, given, reduce_flags};
-use super::form::one_form;
+use super::form::with_form;
 use super::pipeline::{HIDDEN, with_stages};
 use super::preset::Preset;
 use crate::Result;
@@ -19,8 +19,9 @@ const ITS_NUMBER: &str = "keep = \"10%\"";
 /// The pipeline of `reduce`.
 pub(super) fn reduction(arguments: &ReduceArguments, registry: &Registry) -> Result<Graph> {
     let preset = arguments.preset.map_or(Vec::new(), Preset::sets);
-    let form = one_form(&arguments.inputs, &arguments.read, &arguments.written, registry);
-    let sets = given([reduce_flags(arguments), form, common_flags(&arguments.common)]);
+    let ends = (&arguments.read, &arguments.written);
+    let [all, form] = with_form(reduce_flags(arguments), &arguments.inputs, ends, registry);
+    let sets = given([all, form, common_flags(&arguments.common)]);
     let sets = [preset, sets].concat();
     let outliers = arguments.outliers.then_some("outliers");
     let filter = arguments.filter.is_given().then_some("filter");

@@ -4,13 +4,8 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::support::command::{done, fails};
+use crate::support::command::{done, fails, info};
 use crate::support::records::read;
-
-fn info(at: &Path, name: &str) -> Value {
-    let told: Value = serde_json::from_str(&done(at, &["info", "--json", name])).unwrap();
-    told[0].clone()
-}
 
 fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|number| number.as_f64().unwrap()).collect()

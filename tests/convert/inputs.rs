@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::support::case_file;
-use crate::support::command::{done, fails, pointmill};
+use crate::support::command::{done, fails, info, pointmill};
 
 /// Copies of these files of `tests/cases` in a folder.
 fn inputs(names: &[&str]) -> tempfile::TempDir {
@@ -26,12 +26,6 @@ fn both(at: &Path, first: &str, second: &str) -> String {
     let (head, points) = two.split_once('\n').unwrap();
     assert_eq!(one.lines().next(), Some(head));
     one + points
-}
-
-fn info(at: &Path, scan: &str) -> serde_json::Value {
-    let all: serde_json::Value =
-        serde_json::from_str(&done(at, &["info", "--json", scan])).unwrap();
-    all[0].clone()
 }
 
 #[test]
@@ -333,6 +327,13 @@ fn inputs_that_differ_become_one_that_is_not_las_or_has_less() {
     };
     let ply = run("o.ply", &["--point-format", "3"]);
     assert_eq!(ply.lines().count(), 11);
+    // A reduction takes them, too.
+    let reduced = |out: &str| {
+        let run = ["reduce", "23a.las", "23f.las", "-o", out, "--keep", "100%", "--quiet"];
+        done(at, &[&run[..], &["--point-format", "3"]].concat());
+        text(at, out).lines().count()
+    };
+    assert_eq!(reduced("r.ply"), reduced("r.las"));
     // What the smaller format lacks is dropped from what has the fields of both.
     let less = run("o.las", &["--point-format", "0", "--drop", "GpsTime,Red,Green,Blue"]);
     assert_eq!((less.lines().count(), less.contains("GpsTime")), (11, false));

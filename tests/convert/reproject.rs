@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use crate::support::command::{done, fails, pointmill};
+use crate::support::command::{done, fails, info, pointmill};
 
 /// A place in Munich in zone 32 of ETRS89, and by PROJ in zone 33 and in degrees.
 const HERE: [f64; 3] = [691_000.25, 5_335_000.5, 520.125];
@@ -21,11 +21,6 @@ fn folder(place: [f64; 3]) -> tempfile::TempDir {
     let text = format!("x y z intensity\n{}", rows.collect::<String>());
     std::fs::write(at.path().join("in.xyz"), text).unwrap();
     at
-}
-
-fn info(at: &Path, scan: &str) -> Value {
-    let all: Value = serde_json::from_str(&done(at, &["info", "--json", scan])).unwrap();
-    all[0].clone()
 }
 
 /// True if a LAS file says that it is in the systems of these EPSG codes.

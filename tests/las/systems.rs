@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::support::case_file;
-use crate::support::command::{done, fails, pointmill};
+use crate::support::command::{done, fails, info, pointmill};
 
 /// A folder with copies of these files of `tests/cases`.
 fn inputs(names: &[&str]) -> tempfile::TempDir {
@@ -12,12 +12,6 @@ fn inputs(names: &[&str]) -> tempfile::TempDir {
         std::fs::copy(case_file(name), at.path().join(name)).unwrap();
     }
     at
-}
-
-fn info(at: &Path, scan: &str) -> serde_json::Value {
-    let all: serde_json::Value =
-        serde_json::from_str(&done(at, &["info", "--json", scan])).unwrap();
-    all[0].clone()
 }
 
 fn crs(at: &Path, scan: &str) -> String {

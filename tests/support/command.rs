@@ -55,6 +55,13 @@ pub fn done(at: &Path, arguments: &[&str]) -> String {
     stdout
 }
 
+/// What `info` says of a file, as JSON.
+pub fn info(at: &Path, scan: &str) -> serde_json::Value {
+    let all: serde_json::Value =
+        serde_json::from_str(&done(at, &["info", "--json", scan])).unwrap();
+    all[0].clone()
+}
+
 /// Runs a command that must fail with `code` and say each of `parts` on stderr.
 pub fn fails(at: &Path, arguments: &[&str], code: i32, parts: &[&str]) {
     let (given, stdout, stderr) = pointmill(at, arguments);

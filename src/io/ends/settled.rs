@@ -5,7 +5,7 @@
 //! as `f32` has one, though its digits go on. So the points are read once before the run, and the
 //! most decimals of an axis are its step.
 
-use crate::io::steps::{REACH, reaches, whole_steps};
+use crate::io::steps::{reaches, readable_offset, whole_steps};
 use crate::point::names::XYZ;
 use crate::point::{Dimension, Endian, PointBatch, Scalar};
 use crate::quantity::{Figure, Setting};
@@ -241,17 +241,13 @@ impl AxisSpread {
 
     /// An offset from which all points are within reach: 0 or that of the records if it is one.
     fn offset(&self, step: f64) -> Option<f64> {
-        let own = self.grid.map_or(0.0, |(_, origin)| origin);
-        if self.reaches(own, step) {
-            return Some(own);
-        }
+        let Some((_, own)) = self.grid else {
+            let is_empty = self.lo > self.hi;
+            return if is_empty { Some(0.0) } else { readable_offset([self.lo, self.hi], step) };
+        };
         let middle = f64::midpoint(self.lo, self.hi);
-        // Whole thousands where the steps reach that far: their digits stay readable.
-        let units = [1e6, 1e3, 1.0].into_iter().filter(|unit| *unit <= step * REACH / 4.0);
-        let near = units.map(|unit| (middle / unit).round() * unit);
         let stepped = own + ((middle - own) / step).round() * step;
-        let mut all = near.filter(|_| self.grid.is_none()).chain([stepped]);
-        all.find(|offset| self.reaches(*offset, step))
+        [own, stepped].into_iter().find(|offset| self.reaches(*offset, step))
     }
 }
 

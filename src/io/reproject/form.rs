@@ -6,15 +6,12 @@
 
 use super::systems::HeightChange;
 use crate::io::convert::Projection;
-use crate::io::steps::{REACH, reaches};
+use crate::io::steps::readable_offset;
 use crate::point::names::XYZ;
 use crate::point::{Dimension, PointBatch, Scalar, Schema, Value};
 use crate::quantity::{Figure, Setting};
 use crate::report::Short;
 use crate::{Error, Result};
-
-/// Heights that are those of the inputs.
-const KEPT: HeightChange = HeightChange::Times(1.0);
 
 /// How records of the inputs become reprojected ones, but for their coordinates.
 #[derive(Debug, Clone)]
@@ -57,7 +54,7 @@ impl ReprojectedForm {
                 let asked = [given(asked.scale), given(asked.offset)];
                 let place = place.map(|[lo, hi]| [lo[n], hi[n]]);
                 let ground = metres.map(|metres| metres[n]);
-                if !(n == 2 && heights == KEPT && asked == [None; 2]) {
+                if !(n == 2 && heights.is_none() && asked == [None; 2]) {
                     (axis.scale, axis.origin) = steps(&own_axes[n], ground, asked, place)?;
                 }
                 coarser.extend(told_coarser(&own_axes[n], axis, ground, asked[0].is_some()));
@@ -90,7 +87,7 @@ impl ReprojectedForm {
         }
         let (from, to) = (own.schema().endian, self.schema.endian);
         let [own_z, z] = [&self.own_axes[2], &self.axes[2]];
-        let is_z_there = self.heights == KEPT
+        let is_z_there = self.heights.is_none()
             && (own_z.scalar, own_z.scale, own_z.origin) == (z.scalar, z.scale, z.origin);
         let changed = if is_z_there { 2 } else { 3 };
         for (old, new) in own.iter().zip(records.chunks_exact_mut(self.schema.stride)) {
@@ -102,7 +99,7 @@ impl ReprojectedForm {
                 let place = [x, y, if z.is_finite() { z } else { 0.0 }];
                 found = apply(place).map_err(|why| BadPoint::unplaced(place, &why))?;
             }
-            if self.heights == KEPT || !z.is_finite() {
+            if self.heights.is_none() || !z.is_finite() {
                 found[2] = z;
             }
             for (axis, found) in self.axes.iter().zip(found).take(changed) {
@@ -242,13 +239,8 @@ fn power_of_ten(step: f64) -> f64 {
 fn reaching(given: Option<f64>, found: f64, own: f64, place: Option<[f64; 2]>) -> (f64, f64) {
     let mut scale = given.unwrap_or(found);
     let Some(place) = place else { return (scale, own) };
-    let middle = f64::midpoint(place[0], place[1]);
     while scale.is_normal() {
-        // Whole thousands where the steps reach that far: their digits stay readable.
-        let units = [1e6, 1e3, 1.0].into_iter().filter(|unit| *unit <= scale * REACH / 4.0);
-        let near = units.map(|unit| (middle / unit).round() * unit);
-        let mut offsets = [0.0].into_iter().chain(near).chain([(middle / scale).round() * scale]);
-        if let Some(offset) = offsets.find(|offset| reaches(place, *offset, scale)) {
+        if let Some(offset) = readable_offset(place, scale) {
             return (scale, offset);
         }
         if given.is_some() {
@@ -256,5 +248,5 @@ fn reaching(given: Option<f64>, found: f64, own: f64, place: Option<[f64; 2]>) -
         }
         scale *= 10.0;
     }
-    (scale, middle)
+    (scale, f64::midpoint(place[0], place[1]))
 }

@@ -47,8 +47,8 @@ pub fn reprojected(inner: Box<dyn Source>, to: &str, asked: AskedSteps) -> Resul
     let metres = [[was, was, up], [is, is, up / heights.change.factor()]];
     let form = ReprojectedForm::of(inner.schema(), asked, metres, image, heights.change)?;
     let are_degrees = [&from, &to].map(PlacedSystem::is_in_degrees);
-    let (notes, crs) = (heights.told, to.text());
-    let how = HowReprojected { transform, form, told, notes, are_degrees, place, image, crs };
+    let notes = heights.told;
+    let how = HowReprojected { transform, form, told, notes, are_degrees, place, image };
     Ok(Box::new(ReprojectedSource::new(inner, Arc::new(how))))
 }
 
@@ -64,14 +64,12 @@ struct HowReprojected {
     image: Option<[[f64; 3]; 2]>,
     /// Whether the systems are in degrees; None of axes from the centre of the Earth.
     are_degrees: [Option<bool>; 2],
-    /// The system that the points are in then.
-    crs: String,
 }
 
 impl HowReprojected {
     /// What a file of the points says besides them.
     fn metadata(&self, own: &Metadata) -> Metadata {
-        let (crs, units) = (Some(self.crs.clone()), wkt::units(&self.crs));
+        let (crs, units) = (Some(self.told.to.clone()), wkt::units(&self.told.to));
         Metadata { crs, units, moved: true, ..own.clone() }
     }
 }

@@ -1,7 +1,6 @@
 //! Where a scan is, before and after it is reprojected.
 
 use super::operation::PointTransform;
-use super::systems::HeightChange;
 use crate::Result;
 use crate::point::PointBatch;
 use crate::point::names::XYZ;
@@ -107,7 +106,7 @@ pub fn image(transform: &PointTransform, [lo, hi]: [[f64; 3]; 2]) -> Option<[[f6
             (low[axis], high[axis]) = (low[axis].min(image), high[axis].max(image));
         }
     }
-    let changed = if transform.heights() == HeightChange::Times(1.0) { 2 } else { 3 };
+    let changed = if transform.heights().is_none() { 2 } else { 3 };
     for (low, high) in low.iter_mut().zip(&mut high).take(changed) {
         let more = (*high - *low) * BULGE;
         (*low, *high) = (*low - more, *high + more);

@@ -153,6 +153,11 @@ pub struct NewHeights {
 }
 
 impl HeightChange {
+    /// True if heights are those of the inputs.
+    pub fn is_none(self) -> bool {
+        self == HeightChange::Times(1.0)
+    }
+
     /// What the length of a height is multiplied by; 1 where it depends on the place.
     pub fn factor(self) -> f64 {
         match self {
